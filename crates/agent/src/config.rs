@@ -1,0 +1,1 @@
+//! Configuration of the agent binary: TOML file and flags.

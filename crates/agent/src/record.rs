@@ -1,0 +1,1 @@
+//! MCAP recording, shared by agent and simulator.

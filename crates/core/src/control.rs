@@ -1,0 +1,1 @@
+//! Geometric tracking control on SO(3): state and reference to body rates and thrust.

@@ -1,0 +1,1 @@
+//! Hover thrust, estimated in flight.

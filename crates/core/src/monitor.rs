@@ -1,0 +1,1 @@
+//! Deviation monitor: the event that triggers a local replan.

@@ -1,0 +1,1 @@
+"""Mission planning and ground station for fleets of inspection drones."""

@@ -1,0 +1,6 @@
+//! Simulated rate-controlled quadrotors that speak MAVLink as a PX4 does.
+#![forbid(unsafe_code)]
+
+pub mod autopilot;
+pub mod plant;
+pub mod world;

@@ -1,0 +1,1 @@
+//! Rigid body quadrotor with motors, drag and a rate controller.

@@ -1,0 +1,1 @@
+//! n plants, wind, force pulses, ground truth.
