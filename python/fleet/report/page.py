@@ -1,0 +1,59 @@
+"""The report's HTML page."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+from fleet.log.flight import Flight
+from fleet.verdict import Verdict
+
+_TEMPLATE = Path(__file__).with_name("page.html")
+
+
+def write(flight: Flight, verdict: Verdict, path: Path) -> None:
+    """Write the report of `flight` as one self-contained HTML file (temporary file, flush to disk, rename)."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["metres"] = _metres
+    page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(**_context(flight, verdict))
+    temporary = path.with_name(path.name + ".part")
+    with temporary.open("w", encoding="utf-8") as stream:
+        stream.write(page)
+        stream.flush()
+        os.fsync(stream.fileno())
+    temporary.replace(path)
+
+
+def _metres(value: float | None, digits: int = 2) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def _context(flight: Flight, verdict: Verdict) -> dict[str, Any]:
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    from fleet.report import figures
+
+    def embed(figure: Any) -> Markup | None:
+        if figure is None:
+            return None
+        # The fragment is made by the library from numbers and names that passed `is_name`.
+        html = figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False})
+        return Markup(html)
+
+    notices = [(i, notice) for i, log in flight.drones.items() for notice in log.replans]
+    return {
+        "plan": flight.plan,
+        "hash": flight.plan_hash,
+        "log": flight.path.name,
+        "verdict": verdict,
+        "plotly": Markup(get_plotlyjs()),
+        "scene": embed(figures.scene(flight)),
+        "motions": [(d["id"], embed(figures.motion(flight, k))) for k, d in enumerate(flight.plan["drones"])],
+        "distance": embed(figures.distance(flight)),
+        "robustness": embed(figures.robustness(flight)),
+        "deviation": embed(figures.deviation(flight)),
+        "replans": sorted(notices, key=lambda pair: (pair[1]["t_event"], pair[0])),
+        "modes": [(t, i, mode, cause) for i, log in flight.drones.items() for t, mode, cause in log.modes],
+    }
