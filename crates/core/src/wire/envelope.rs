@@ -56,3 +56,30 @@ pub enum Up {
     /// On `up/replan`.
     Replan(ReplanNotice),
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{EventKind, Mode, encode};
+
+    #[test]
+    fn an_event_survives_the_wire() {
+        let event = Event {
+            drone: "d1".into(),
+            mission_time: Some(1.5),
+            kind: EventKind::Mode { from: Mode::Idle, to: Mode::Armed },
+            cause: "commanded".into(),
+        };
+        let sent = Envelope {
+            schema: SCHEMA,
+            mission_id: "0".repeat(32),
+            epoch: 1,
+            seq: 2,
+            issued: Nanos(3),
+            valid_until: Nanos(4),
+            body: Up::Event(event),
+        };
+        let bytes = encode(&sent).expect("encodes");
+        assert_eq!(Envelope::<Up>::from_bytes(&bytes).expect("decodes"), sent);
+    }
+}

@@ -172,7 +172,8 @@ pub struct Event {
     pub drone: String,
     /// Mission time [s] when a start is known.
     pub mission_time: Option<f64>,
-    /// What.
+    /// What; `what` on the wire, because `kind` there names the kind of message.
+    #[serde(rename = "what")]
     pub kind: EventKind,
     /// Why, for people.
     pub cause: String,
