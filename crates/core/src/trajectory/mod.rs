@@ -5,6 +5,7 @@
 //! by construction and no continuity has to be checked.
 
 mod bernstein;
+mod bounds;
 pub mod clearance;
 
 pub use bernstein::{Quintic, subdivide};

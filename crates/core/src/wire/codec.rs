@@ -1,6 +1,6 @@
 //! The one encode and the one decode.
 
-use super::{Envelope, SCHEMA};
+use super::{Envelope, Plan, SCHEMA};
 use serde::{Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
@@ -72,6 +72,17 @@ impl<T: DeserializeOwned> Envelope<T> {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, DecodeError> {
         let envelope: Self = decode(bytes)?;
         if envelope.schema == SCHEMA { Ok(envelope) } else { Err(DecodeError::Schema(envelope.schema)) }
+    }
+}
+
+impl Plan {
+    /// Reads a plan file and checks its version.
+    ///
+    /// # Errors
+    /// See [`DecodeError`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let plan: Self = decode(bytes)?;
+        if plan.schema == SCHEMA { Ok(plan) } else { Err(DecodeError::Schema(plan.schema)) }
     }
 }
 

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Offer {
     /// SHA-256 of `plan` in hex.
     pub hash: String,
-    /// The bytes of the plan file (`X.plan.cbor`).
+    /// The bytes of the plan file (`X.plan.cbor`), a CBOR byte string.
+    #[serde(with = "super::byte_string")]
     pub plan: Vec<u8>,
 }
 

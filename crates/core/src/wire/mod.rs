@@ -3,6 +3,7 @@
 //! Messages are CBOR maps with named fields inside an [`Envelope`]. Python sees them through
 //! `fleet._core`; nothing is defined twice.
 
+mod byte_string;
 mod codec;
 mod command;
 mod envelope;
