@@ -7,6 +7,12 @@ use fleet_core::types::{Quat, Setpoint, Vec3, wxyz};
 use fleet_core::wire::{Status, Up};
 use serde::{Deserialize, Serialize};
 
+/// File name of the committed plan in [`Output::Persist`]: the bytes of the plan file, written before
+/// the commit is acknowledged. The solver's worker and the `plan` query take the plan from here.
+pub const PLAN_FILE: &str = "plan.cbor";
+/// File name of the last offered plan in [`Output::Persist`], written before the offer is accepted.
+pub const OFFER_FILE: &str = "offer.cbor";
+
 /// Flight mode of the autopilot as far as the agent cares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

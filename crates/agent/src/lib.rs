@@ -8,4 +8,4 @@ pub mod record;
 mod step;
 
 pub use fleet_core::replan::{Request as SolveRequest, Solution as SolveResult};
-pub use step::{Agent, AgentConfig};
+pub use step::{Agent, AgentConfig, Landing, PreflightLimits, VehicleLimits};

@@ -1,18 +1,10 @@
 //! The agent as a pure function of time and messages.
 
-use crate::io::{Input, Output};
-use fleet_core::types::Nanos;
-use serde::{Deserialize, Serialize};
+mod config;
 
-/// What the step needs to know before the first message.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AgentConfig {
-    /// Name of the fleet.
-    pub fleet: String,
-    /// Id of this drone.
-    pub drone: String,
-}
+use crate::io::{Input, Output};
+pub use config::{AgentConfig, Landing, PreflightLimits, VehicleLimits};
+use fleet_core::types::Nanos;
 
 /// The onboard logic.
 #[derive(Debug)]
