@@ -5,6 +5,7 @@
     +-- InputError           2 something the user wrote is not legal
     |   +-- ScenarioError      a scenario file, with all of its problems at once
     |   +-- FormulaError       a formula text, with line and column
+    |   +-- LogError           a flight log that cannot be read
     +-- InfeasibleError      3 no plan can satisfy the mission; names the clause
     +-- EnvironmentError_    4 port, peer, process or version
     +-- InterruptedError_  130 stopped by the user with nothing kept
@@ -18,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from pathlib import Path
 from typing import ClassVar
 
 
@@ -103,6 +105,16 @@ class FormulaError(InputError):
         self.reason = message
         self.line = line
         self.column = column
+
+
+class LogError(InputError):
+    """A flight log that cannot be read."""
+
+    code = "log"
+
+    def __init__(self, path: Path, message: str) -> None:
+        super().__init__(f"{path}: {message}", problems=[Problem(self.code, str(path), "", message)])
+        self.path = path
 
 
 class InfeasibleError(FleetError):

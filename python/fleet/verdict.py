@@ -33,8 +33,8 @@ class DroneVerdict:
 
     `rmse_m`, `max_m`: truth against the committed reference over [0, T]; `rmse_plan_m`, `max_plan_m`: against
     the fleet plan. `min_clearance_m`: least signed distance to any obstacle from take-off to landing.
-    `gap_max_ms`: longest pause between two setpoints in flight. `end`: last mode the drone reported, `landed` when it
-    came down and disarmed.
+    `gap_max_ms`: longest pause between two setpoints in flight. `end`: last mode the drone reported, `landed`
+    when it came down and disarmed.
     """
 
     id: str
@@ -53,9 +53,9 @@ class DroneVerdict:
 class Verdict:
     """The judgement of one flight.
 
-    `source` is `truth` (the simulator's own) or `estimate` (the vehicles'). `problems` says why a mission counts as
-    violated beyond its clauses: a drone that did not land, a log that does not cover [0, T], an obstacle touched or a
-    pair too close in take-off or landing.
+    `source` is `truth` (the simulator's own) or `estimate` (the vehicles'). `problems` says why a mission
+    counts as violated beyond its clauses: a drone that did not land, a log that does not cover [0, T], an
+    obstacle touched or a pair too close in take-off or landing.
     """
 
     source: str
@@ -215,7 +215,7 @@ def _gap(log: DroneLog, span: tuple[float, float]) -> float | None:
 
 def _end(flight: Flight, drone: str) -> str:
     log = flight.drones[drone]
-    landed = any(d == drone and e["kind"].get("event") == "landed" for _, d, e in flight.events)
+    landed = any(d == drone and e["what"].get("event") == "landed" for _, d, e in flight.events)
     return "landed" if landed else (log.modes[-1][1] if log.modes else "unknown")
 
 
@@ -227,7 +227,7 @@ def _min_pair(plan: _core.Plan, tracks: dict[str, Array]) -> float | None:
 
 
 def _outside_mission(plan: _core.Plan, flight: Flight, tracks: dict[str, Array]) -> list[str]:
-    """Safety in take-off and landing: no obstacle touched, no pair too close, the floor left out (design.md, Start)."""
+    """Safety from take-off to landing: obstacles and pairs, the floor left out (design.md, Start)."""
     problems = []
     spans = {i: airborne(log) for i, log in flight.drones.items()}
     for i, span in spans.items():

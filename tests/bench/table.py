@@ -26,7 +26,11 @@ def publish(name: str, rows: list[dict[str, Any]]) -> None:
     git = subprocess.run(
         ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.strip()
-    machine = {"cpu": platform.processor() or platform.machine(), "cores": os.cpu_count(), "load": os.getloadavg()[0]}
+    machine = {
+        "cpu": platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "load": os.getloadavg()[0],
+    }
     folder = ROOT / "target" / "bench"
     folder.mkdir(parents=True, exist_ok=True)
     document = {"schema": SCHEMA, "git": git, "machine": machine, "rows": rows}

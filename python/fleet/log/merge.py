@@ -3,6 +3,7 @@
 import base64
 import heapq
 import json
+import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -45,7 +46,7 @@ def merge(
 
     temporary = out.with_name(out.name + ".part")
     with temporary.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.LZ4)
+        writer: Any = Writer(stream, compression=CompressionType.LZ4)
         writer.start(profile="", library="fleet")
         channels = _Channels(writer)
         _write_mission(channels, mission, verdict)
@@ -64,7 +65,9 @@ class _Channels:
         self._schemas: dict[tuple[str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int], int] = {}
 
-    def write(self, topic: str, encoding: str, schema: tuple[str, str, bytes] | None, at: int, data: bytes) -> None:
+    def write(
+        self, topic: str, encoding: str, schema: tuple[str, str, bytes] | None, at: int, data: bytes
+    ) -> None:
         schema_id = 0
         if schema is not None:
             name, kind, text = schema
@@ -77,9 +80,7 @@ class _Channels:
             self._channels[key] = self._writer.register_channel(
                 topic=topic, message_encoding=encoding, schema_id=schema_id
             )
-        self._writer.add_message(
-            channel_id=self._channels[key], log_time=at, data=data, publish_time=at
-        )
+        self._writer.add_message(channel_id=self._channels[key], log_time=at, data=data, publish_time=at)
 
     def json(self, topic: str, schema: str, at: int, body: dict[str, Any]) -> None:
         data = json.dumps({"timestamp": schemas.stamp(at), **body}, separators=(",", ":"), allow_nan=False)
@@ -115,7 +116,12 @@ def _poses(drone: Any) -> dict[str, Any]:
     poses = [
         {
             "position": {"x": row[0], "y": row[1], "z": row[2]},
-            "orientation": {"x": 0.0, "y": 0.0, "z": float(np.sin(row[12] / 2)), "w": float(np.cos(row[12] / 2))},
+            "orientation": {
+                "x": 0.0,
+                "y": 0.0,
+                "z": float(np.sin(row[12] / 2)),
+                "w": float(np.cos(row[12] / 2)),
+            },
         }
         for row in trajectory.sample(times).tolist()
     ]

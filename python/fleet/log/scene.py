@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet import _core
-from fleet.geometry import hull_triangles, vertices
+from fleet.scenario.region import Region
 
 _IDENTITY = {
     "position": {"x": 0.0, "y": 0.0, "z": 0.0},
@@ -29,9 +29,25 @@ def role(name: str, plan: _core.Plan) -> str:
     return "home" if name.startswith("home.") else "target"
 
 
+def vertices(region: Any) -> NDArray[np.float64]:
+    """Corners of a plan's region, shape (k, 3) [m]."""
+    faces = region["shape"]
+    normals = np.array([face["a"] for face in faces], dtype=float)
+    offsets = np.array([face["b"] for face in faces], dtype=float)
+    return Region(region["name"], normals, offsets).vertices
+
+
+def hull_triangles(corners: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Triangles of the convex hull as indices of corners, shape (n, 3)."""
+    from scipy.spatial import ConvexHull
+
+    triangles: NDArray[np.intp] = ConvexHull(corners).simplices.astype(np.intp)
+    return triangles
+
+
 def entity(region: Any, plan: _core.Plan, timestamp: dict[str, int]) -> dict[str, Any]:
     """One region as a `foxglove.SceneEntity`."""
-    corners: NDArray[np.float64] = vertices(region["shape"])
+    corners = vertices(region)
     points = corners[hull_triangles(corners)].reshape(-1, 3)
     return {
         "timestamp": timestamp,

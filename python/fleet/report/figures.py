@@ -8,9 +8,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fleet import _core
-from fleet.geometry import hull_triangles, vertices
 from fleet.log.flight import Array, Flight
-from fleet.log.scene import role
+from fleet.log.scene import hull_triangles, role, vertices
 from fleet.report import palette
 from fleet.verdict import mission_times, positions_at
 
@@ -58,14 +57,16 @@ def motion(flight: Flight, index: int) -> go.Figure:
             color = palette.DRONES[axis]
             figure.add_trace(
                 go.Scatter(
-                    x=times, y=planned[:, 3 * row + axis], name=f"{_AXES[axis]} planned", legendgroup=_AXES[axis],
+                    x=times, y=planned[:, 3 * row + axis], name=f"{_AXES[axis]} planned",
+                    legendgroup=_AXES[axis],
                     line={"color": color, "dash": "dash", "width": 1}, showlegend=row == 0,
                 ),
                 row=row + 1, col=1,
             )  # fmt: skip
             figure.add_trace(
                 go.Scatter(
-                    x=flown[:, 0], y=measured[:, axis], name=f"{_AXES[axis]} flown", legendgroup=_AXES[axis],
+                    x=flown[:, 0], y=measured[:, axis], name=f"{_AXES[axis]} flown",
+                    legendgroup=_AXES[axis],
                     line={"color": color, "width": 1.5}, showlegend=row == 0,
                 ),
                 row=row + 1, col=1,
@@ -152,7 +153,8 @@ def _finish(figure: go.Figure, label: str) -> None:
 
 
 def _planned(plan: _core.Plan, index: int) -> Array:
-    return _core.Trajectory.from_list(plan["drones"][index]["trajectory"]).sample(mission_times(plan))
+    trajectory = _core.Trajectory.from_list(plan["drones"][index]["trajectory"])
+    return trajectory.sample(mission_times(plan))
 
 
 def _flown(flight: Flight, drone: str) -> Array:
@@ -163,11 +165,13 @@ def _flown(flight: Flight, drone: str) -> Array:
 def _path(points: Array, name: str, color: str, dash: str) -> go.Scatter3d:
     x, y, z = points.T
     width = 5 if dash == "solid" else 3
-    return go.Scatter3d(x=x, y=y, z=z, mode="lines", name=name, line={"color": color, "width": width, "dash": dash})
+    return go.Scatter3d(
+        x=x, y=y, z=z, mode="lines", name=name, line={"color": color, "width": width, "dash": dash}
+    )
 
 
 def _mesh(region: Any, kind: str) -> go.Mesh3d:
-    corners = vertices(region["shape"])
+    corners = vertices(region)
     i, j, k = hull_triangles(corners).T
     x, y, z = corners.T
     color = {"obstacle": palette.OBSTACLE, "target": palette.TARGET, "home": palette.HOME}[kind]

@@ -11,10 +11,15 @@ _TEMPLATE = Path(__file__).with_name("page.html")
 
 
 def write(flight: Flight, verdict: Verdict, path: Path) -> None:
-    """Write the report of `flight` as one self-contained HTML file (temporary file, flush to disk, rename)."""
+    """Write the report of `flight` as one self-contained HTML file.
+
+    Temporary file, flush to disk, rename.
+    """
     from jinja2 import Environment, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     environment.filters["metres"] = _metres
     page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(**_context(flight, verdict))
     temporary = path.with_name(path.name + ".part")

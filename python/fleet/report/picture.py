@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from fleet.geometry import hull_triangles, vertices
 from fleet.log.flight import Flight
-from fleet.log.scene import role
+from fleet.log.scene import hull_triangles, role, vertices
 from fleet.report import palette
 
 
@@ -24,7 +23,7 @@ def draw(flight: Flight, path: Path) -> None:
         kind = role(region["name"], plan)
         if kind == "workspace":
             continue
-        corners = vertices(region["shape"])
+        corners = vertices(region)
         faces = Poly3DCollection(
             corners[hull_triangles(corners)],
             facecolor=colors[kind],
@@ -38,7 +37,7 @@ def draw(flight: Flight, path: Path) -> None:
         track = log.truth if len(log.truth) else log.state
         color = palette.drone_color(index)
         axes.plot(track[:, 1], track[:, 2], track[:, 3], color=color, linewidth=1.6, label=drone)
-    corners = vertices(next(r["shape"] for r in plan["regions"] if r["name"] == plan["workspace"]))
+    corners = vertices(next(r for r in plan["regions"] if r["name"] == plan["workspace"]))
     low, high = corners.min(axis=0), corners.max(axis=0)
     axes.set(
         xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
