@@ -113,19 +113,15 @@ def _write_mission(channels: _Channels, mission: Mission, verdict: dict[str, Any
 def _poses(drone: Any) -> dict[str, Any]:
     trajectory = _core.Trajectory.from_list(drone["trajectory"])
     times = np.arange(trajectory.start, trajectory.end + 1e-9, _PLAN_STEP)
-    poses = [
-        {
-            "position": {"x": row[0], "y": row[1], "z": row[2]},
-            "orientation": {
-                "x": 0.0,
-                "y": 0.0,
-                "z": float(np.sin(row[12] / 2)),
-                "w": float(np.cos(row[12] / 2)),
-            },
-        }
-        for row in trajectory.sample(times).tolist()
-    ]
-    return {"frame_id": "map", "poses": poses}
+    return {"frame_id": "map", "poses": [_pose(row) for row in trajectory.sample(times).tolist()]}
+
+
+def _pose(row: list[float]) -> dict[str, Any]:
+    x, y, z, half = row[0], row[1], row[2], row[12] / 2
+    return {
+        "position": {"x": x, "y": y, "z": z},
+        "orientation": {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)},
+    }
 
 
 def _copy(parts: list[Path], channels: _Channels, progress: Callable[[float], None] | None) -> None:
