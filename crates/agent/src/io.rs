@@ -3,8 +3,8 @@
 //! Vehicle messages are already in the world ENU and body FLU frames (the MAVLink file turns them),
 //! but positions are still relative to the autopilot's own origin.
 
-use fleet_core::types::{Quat, Setpoint, Vec3, wxyz};
-use fleet_core::wire::{Status, Up};
+use fleet_core::types::{Quat, Reference, Setpoint, State, Vec3, wxyz};
+use fleet_core::wire::{Mode, Status, Up};
 use serde::{Deserialize, Serialize};
 
 /// File name of the committed plan in [`Output::Persist`]: the bytes of the plan file, written before
@@ -213,6 +213,25 @@ pub enum Input {
     },
 }
 
+/// What a control tick saw and did, for the log.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tick {
+    /// Mode.
+    pub mode: Mode,
+    /// Mission time [s] when a start is known.
+    pub mission_time: Option<f64>,
+    /// Newest vehicle state.
+    pub state: Option<State>,
+    /// Committed reference at this time.
+    pub reference: Option<Reference>,
+    /// Setpoint sent in this tick.
+    pub setpoint: Option<Setpoint>,
+    /// Distance between state and committed reference [m].
+    pub deviation: Option<f64>,
+    /// Estimated hover thrust, 0 to 1.
+    pub hover_thrust: f64,
+}
+
 /// One message out of [`crate::Agent::step`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "out", rename_all = "snake_case")]
@@ -239,4 +258,6 @@ pub enum Output {
     },
     /// What the `status` query answers from now on.
     Status(Status),
+    /// State, reference and setpoint of this tick, for the log; one every 10 ms in every mode.
+    Tick(Box<Tick>),
 }

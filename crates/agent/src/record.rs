@@ -1,1 +1,0 @@
-//! MCAP recording, shared by agent and simulator.
