@@ -1,7 +1,8 @@
 //! Robustness of formulas over the fleet's positions.
 
 use crate::convert::{from_python, points, value_error};
-use fleet_core::formula::{Compiled, Formula, FormulaError, Names, compile, exact};
+use crate::trajectory::Trajectory;
+use fleet_core::formula::{Compiled, Formula, FormulaError, Names, bound, compile, exact};
 use fleet_core::types::Vec3;
 use numpy::ndarray::Axis;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray3};
@@ -86,6 +87,28 @@ impl Fleet {
         let compiled = self.compile(formula, sample)?;
         let tracks = tracks(&positions)?;
         let point = py.detach(|| exact::evaluate(&compiled, &tracks)).map_err(value_error)?;
+        Ok((point.rho, point.at as f64 * sample))
+    }
+
+    /// Guaranteed lower bound [m] at time 0 over continuous time, and the time [s] of the sample at which, or after
+    /// which, it is attained; never above the exact robustness.
+    ///
+    /// trajectories: one for each drone, covering 0 to the horizon; sample: sample period [s], witnesses of eventually
+    /// and until lie on it. ValueError: as check, and when a trajectory is missing or too short.
+    fn lower_bound(
+        &self,
+        py: Python<'_>,
+        formula: &Bound<'_, PyAny>,
+        trajectories: Vec<Py<Trajectory>>,
+        sample: f64,
+    ) -> PyResult<(f64, f64)> {
+        let compiled = self.compile(formula, sample)?;
+        let point = py
+            .detach(|| {
+                let trajectories: Vec<_> = trajectories.iter().map(|t| &t.get().0).collect();
+                bound::lower_bound(&compiled, &trajectories)
+            })
+            .map_err(value_error)?;
         Ok((point.rho, point.at as f64 * sample))
     }
 }

@@ -109,7 +109,7 @@ impl Trajectory {
     }
 
     /// Upper bounds of |v| [m/s] and |a| [m/s^2] per axis over continuous time, (3,) each: never below the true
-    /// maximum, within 0.01 % of it (Bernstein control points with subdivision).
+    /// maximum, at most 1e-7 above it (Bernstein control points with subdivision).
     fn bounds<'py>(&self, py: Python<'py>) -> Bounds<'py> {
         let (v, a) = self.0.bounds();
         (v.as_slice().to_pyarray(py), a.as_slice().to_pyarray(py))

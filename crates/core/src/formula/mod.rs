@@ -1,9 +1,10 @@
 //! Signal Temporal Logic: one tree and its evaluators.
 //!
 //! [`compile`] resolves names and brings a [`Formula`] into negation normal form once; [`exact`]
-//! gives its robustness at the samples of a trace; a guaranteed lower bound over the
+//! gives its robustness at the samples of a trace, [`bound`] a guaranteed lower bound over the
 //! continuous time of trajectories. Both walk the same [`Node`]s with the same window operators.
 
+pub mod bound;
 mod compile;
 mod error;
 pub mod exact;

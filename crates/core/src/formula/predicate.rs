@@ -1,6 +1,10 @@
 //! Predicates: their value at a point and a lower bound over a piece of curve.
 
 use crate::geometry::Polyhedron;
+use crate::trajectory::Quintic;
+use crate::trajectory::clearance::{
+    max_pair_distance, min_inside, min_outside, min_pair_distance, min_value,
+};
 use crate::types::Vec3;
 
 /// One summand of [`Predicate::Linear`].
@@ -68,6 +72,37 @@ impl Predicate {
             Self::Near { a, b, value } => value - (position(*a) - position(*b)).norm(),
             Self::Linear { terms, constant } => {
                 terms.iter().map(|t| t.coef * position(t.drone)[t.axis]).sum::<f64>() + constant
+            }
+        }
+    }
+
+    /// Indices of the drones that it speaks of.
+    #[must_use]
+    pub fn drones(&self) -> Vec<usize> {
+        match self {
+            Self::Inside { drone, .. } | Self::Outside { drone, .. } => vec![*drone],
+            Self::Apart { a, b, .. } | Self::Near { a, b, .. } => vec![*a, *b],
+            Self::Linear { terms, .. } => terms.iter().map(|t| t.drone).collect(),
+        }
+    }
+
+    /// Lower bound of the robustness while each drone runs along `curve` of it, all of one duration,
+    /// within [`crate::trajectory::clearance::TOLERANCE`] (squared distances: of the square).
+    pub fn lower_bound(&self, curve: impl Fn(usize) -> Quintic) -> f64 {
+        let all = f64::INFINITY;
+        match self {
+            Self::Inside { drone, region } => min_inside(&curve(*drone), region, all),
+            Self::Outside { drone, region } => min_outside(&curve(*drone), region, all),
+            Self::Apart { a, b, value } => min_pair_distance(&curve(*a), &curve(*b), all) - value,
+            Self::Near { a, b, value } => value - max_pair_distance(&curve(*a), &curve(*b)),
+            Self::Linear { terms, constant } => {
+                let mut coefficients = [*constant; 6];
+                for term in terms {
+                    for (sum, point) in coefficients.iter_mut().zip(curve(term.drone).points) {
+                        *sum += term.coef * point[term.axis];
+                    }
+                }
+                min_value(coefficients, all)
             }
         }
     }

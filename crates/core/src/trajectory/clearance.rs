@@ -49,6 +49,13 @@ pub fn min_pair_distance(a: &Quintic, b: &Quintic, enough: f64) -> f64 {
     min_value(squared_norm(&d), enough * enough).max(0.0).sqrt()
 }
 
+/// Upper bound of the distance between two quintics of the same duration, run side by side [m].
+#[must_use]
+pub fn max_pair_distance(a: &Quintic, b: &Quintic) -> f64 {
+    let d: [Vec3; 6] = std::array::from_fn(|i| a.points[i] - b.points[i]);
+    (-min_value(squared_norm(&d).map(|c| -c), f64::INFINITY)).max(0.0).sqrt()
+}
+
 /// Lower bound of a scalar polynomial on [0, 1] given by its Bernstein coefficients; `enough` as in
 /// [`min_outside`].
 #[must_use]

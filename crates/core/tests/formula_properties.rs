@@ -1,0 +1,182 @@
+//! Laws of robustness: duality, monotony, shift, and the bound below every sampling.
+#![allow(missing_docs, clippy::unwrap_used)] // clippy.toml spares only functions marked as tests
+
+mod common;
+
+use common::{HORIZON, SAMPLE, formula, names, predicate, sampled, tracks, trajectory, window};
+use fleet_core::formula::{Compiled, Formula, FormulaError, bound, compile, exact};
+use fleet_core::types::Vec3;
+use proptest::prelude::*;
+
+fn compiled(formula: &Formula) -> Compiled {
+    compile(formula, &names(), SAMPLE).unwrap()
+}
+
+fn rho(formula: &Formula, tracks: &[Vec<Vec3>]) -> f64 {
+    exact::evaluate(&compiled(formula), tracks).unwrap().rho
+}
+
+fn boxed(f: &Formula) -> Box<Formula> {
+    Box::new(f.clone())
+}
+
+proptest! {
+    #![proptest_config(common::seeded(512))]
+
+    #[test]
+    fn negation_changes_the_sign(f in formula(), tracks in tracks()) {
+        let not = Formula::Not { f: boxed(&f) };
+        prop_assert_eq!(rho(&not, &tracks), -rho(&f, &tracks));
+    }
+
+    #[test]
+    fn double_negation_compiles_to_the_same(f in formula()) {
+        let not = Formula::Not { f: boxed(&f) };
+        let twice = Formula::Not { f: Box::new(not) };
+        prop_assert_eq!(compiled(&twice), compiled(&f));
+    }
+
+    #[test]
+    fn a_wider_window_lowers_always_and_raises_eventually(
+        f in predicate(), (from, to) in window(), tracks in tracks()
+    ) {
+        let wider = to + SAMPLE;
+        let always = |to| Formula::Always { from, to, f: boxed(&f) };
+        let eventually = |to| Formula::Eventually { from, to, f: boxed(&f) };
+        prop_assert!(rho(&always(wider), &tracks) <= rho(&always(to), &tracks));
+        prop_assert!(rho(&eventually(wider), &tracks) >= rho(&eventually(to), &tracks));
+    }
+
+    #[test]
+    fn until_with_a_true_left_side_is_eventually(f in predicate(), (from, to) in window(), tracks in tracks()) {
+        // d1.x >= -1000 holds by far.
+        let always_true = Formula::Linear { terms: vec![fleet_core::formula::Term {
+            drone: "d1".to_owned(), axis: fleet_core::formula::Axis::X, coef: 1.0 }], constant: 1000.0 };
+        let until = Formula::Until { from, to, left: Box::new(always_true), right: boxed(&f) };
+        let eventually = Formula::Eventually { from, to, f: boxed(&f) };
+        prop_assert_eq!(rho(&until, &tracks), rho(&eventually, &tracks));
+    }
+
+    #[test]
+    fn the_trace_at_k_is_the_value_of_the_trace_cut_at_k(f in formula(), tracks in tracks()) {
+        let f = compiled(&f);
+        let trace = exact::robustness(&f, &tracks).unwrap();
+        prop_assert_eq!(trace.len(), tracks[0].len() - f.root.horizon());
+        for (k, point) in trace.iter().enumerate() {
+            let cut: Vec<&[Vec3]> = tracks.iter().map(|t| &t[k..]).collect();
+            let alone = exact::evaluate(&f, &cut).unwrap();
+            prop_assert_eq!(alone.rho, point.rho);
+            prop_assert_eq!(alone.at + k, point.at);
+        }
+    }
+
+    #[test]
+    fn the_value_is_attained_at_the_tightest_sample(f in formula(), tracks in tracks()) {
+        // Some predicate of the normal form has this very value there; `release` negates twice.
+        let f = compiled(&f);
+        let point = exact::evaluate(&f, &tracks).unwrap();
+        prop_assert!(point.at <= f.root.horizon());
+        let mut values = Vec::new();
+        leaves(&f.root, &mut values, &|p| p.value(|d| tracks[d][point.at]));
+        prop_assert!(values.contains(&point.rho));
+    }
+}
+
+fn leaves(
+    node: &fleet_core::formula::Node,
+    out: &mut Vec<f64>,
+    value: &impl Fn(&fleet_core::formula::Predicate) -> f64,
+) {
+    use fleet_core::formula::Node;
+    match node {
+        Node::Predicate(p) => out.push(value(p)),
+        Node::And(fs) | Node::Or(fs) => fs.iter().for_each(|f| leaves(f, out, value)),
+        Node::Always(_, f) | Node::Eventually(_, f) => leaves(f, out, value),
+        Node::Until { left, right, .. } | Node::Release { left, right, .. } => {
+            leaves(left, out, value);
+            leaves(right, out, value);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(common::seeded(256))]
+
+    #[test]
+    fn the_bound_is_below_every_refinement_of_the_samples(
+        f in formula(), a in trajectory(), b in trajectory()
+    ) {
+        let bound = bound::lower_bound(&compiled(&f), &[&a, &b]).unwrap();
+        for refinement in [1, 7] {
+            let sample = SAMPLE / f64::from(refinement);
+            let fine = compile(&f, &names(), sample).unwrap();
+            let count = fine.root.horizon() + 1;
+            let tracks = [sampled(&a, sample, count), sampled(&b, sample, count)];
+            let exact = exact::evaluate(&fine, &tracks).unwrap();
+            prop_assert!(bound.rho <= exact.rho, "bound {} above exact {} at 1/{}", bound.rho, exact.rho, refinement);
+        }
+    }
+
+    #[test]
+    fn the_bound_of_always_over_regions_and_pairs_is_tight(
+        f in predicate(), (from, to) in window(), a in trajectory(), b in trajectory()
+    ) {
+        let always = Formula::Always { from, to, f: Box::new(f) };
+        let bound = bound::lower_bound(&compiled(&always), &[&a, &b]).unwrap();
+        let sample = SAMPLE / 200.0;
+        let fine = compile(&always, &names(), sample).unwrap();
+        let count = fine.root.horizon() + 1;
+        let tracks = [sampled(&a, sample, count), sampled(&b, sample, count)];
+        let exact = exact::evaluate(&fine, &tracks).unwrap();
+        // These curves reach 30 m/s, so that 0.5 ms of sampling costs up to 15 mm on its own.
+        prop_assert!(bound.rho >= exact.rho - 0.02, "bound {} far below {}", bound.rho, exact.rho);
+    }
+
+    #[test]
+    fn at_a_single_moment_the_bound_is_the_value(f in predicate(), a in trajectory(), b in trajectory()) {
+        let bound = bound::lower_bound(&compiled(&f), &[&a, &b]).unwrap();
+        let value = rho(&f, &[sampled(&a, SAMPLE, 1), sampled(&b, SAMPLE, 1)]);
+        prop_assert!((value - bound.rho - bound::ROUNDING).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn what_is_not_legal_is_refused_with_its_name() {
+    let inside =
+        |drone: &str, region: &str| Formula::In { drone: drone.to_owned(), region: region.to_owned() };
+    let always = |from, to| Formula::Always { from, to, f: Box::new(inside("d1", "box")) };
+    let error = |f: &Formula| compile(f, &names(), SAMPLE).unwrap_err().to_string();
+    assert_eq!(error(&inside("d3", "box")), "unknown drone `d3`; the fleet has d1, d2");
+    assert_eq!(error(&inside("d1", "bax")), "unknown region `bax`; there are box, wedge");
+    for (from, to) in
+        [(0.05, 1.0), (1.0, 0.5), (-0.1, 1.0), (0.0, f64::INFINITY), (f64::NAN, 1.0), (0.0, 1e12)]
+    {
+        assert!(matches!(compile(&always(from, to), &names(), SAMPLE), Err(FormulaError::Window { .. })));
+    }
+    assert_eq!(error(&Formula::And { fs: Vec::new() }), "`and` needs at least one operand");
+    let dist = Formula::Dist {
+        a: "d1".to_owned(),
+        b: "d2".to_owned(),
+        cmp: fleet_core::formula::Comparison::Ge,
+        value: f64::NAN,
+    };
+    assert_eq!(error(&dist), "the threshold of dist is not a finite number");
+    for sample in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(compile(&always(0.0, 1.0), &names(), sample), Err(FormulaError::Sample(_))));
+    }
+}
+
+#[test]
+fn a_trace_that_ends_before_the_horizon_is_refused() {
+    let inside = Formula::In { drone: "d1".to_owned(), region: "box".to_owned() };
+    let f = compiled(&Formula::Eventually { from: 0.0, to: 1.0, f: Box::new(inside) });
+    let track = |n: usize| vec![vec![Vec3::zeros(); n]; 2];
+    assert!(exact::evaluate(&f, &track(11)).is_ok());
+    let short = exact::evaluate(&f, &track(10)).unwrap_err();
+    assert_eq!(short.to_string(), "the formula looks 1 s ahead, beyond the end at 0.9 s");
+    assert!(exact::evaluate(&f, &track(0)).is_err());
+    assert!(exact::evaluate(&f, &track(11)[..1]).is_err());
+    let mut hole = track(HORIZON);
+    hole[1][3].y = f64::NAN;
+    assert_eq!(exact::evaluate(&f, &hole).unwrap_err(), FormulaError::NotFinite("a position".to_owned()));
+}
