@@ -143,6 +143,28 @@ impl Trajectory {
         Quintic::from_ends(b.t - a.t, (a.p, a.v, a.a), (b.p, b.v, b.a))
     }
 
+    /// Heading quintic of one segment, in the first coordinate; the other two are zero.
+    ///
+    /// # Panics
+    /// When `segment` is not below [`Trajectory::segments`].
+    #[must_use]
+    pub fn heading_quintic(&self, segment: usize) -> Quintic {
+        let (a, b) = (&self.knots[segment], &self.knots[segment + 1]);
+        let lift = |x: f64| Vec3::new(x, 0.0, 0.0);
+        let ends = |k: &Knot| (lift(k.psi), lift(k.psi_rate), lift(k.psi_acc));
+        Quintic::from_ends(b.t - a.t, ends(a), ends(b))
+    }
+
+    /// Position, velocity and acceleration at mission time `t` [m, m/s, m/s^2], clamped to the ends.
+    #[must_use]
+    pub fn motion(&self, t: f64) -> (Vec3, Vec3, Vec3) {
+        let i = self.segment_at(t);
+        let (a, b) = (&self.knots[i], &self.knots[i + 1]);
+        let s = ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
+        let q = self.quintic(i);
+        (q.position(s), q.velocity(s), q.acceleration(s))
+    }
+
     /// The reference at mission time `t` [s]; before the start and after the end it rests at the
     /// first and last position.
     #[must_use]
@@ -159,11 +181,7 @@ impl Trajectory {
         let h = b.t - a.t;
         let s = (t - a.t) / h;
         let q = self.quintic(i);
-        let heading = |k: &Knot| {
-            let lift = |x: f64| Vec3::new(x, 0.0, 0.0);
-            (lift(k.psi), lift(k.psi_rate), lift(k.psi_acc))
-        };
-        let psi = Quintic::from_ends(h, heading(a), heading(b));
+        let psi = self.heading_quintic(i);
         Reference {
             p: q.position(s),
             v: q.velocity(s),

@@ -1,0 +1,182 @@
+//! The independent check of a replan: a solver's word is not enough to fly on.
+//!
+//! Everything is looked at on the trajectory itself, over continuous time, with the polyhedra and the
+//! peers' plans, not with the rows that the solver was given.
+
+use super::corridor::Scene;
+use super::start::{Allowance, knot_after, recovery_depth, recovery_time};
+use crate::trajectory::clearance::{max_abs, min_inside, min_outside, min_value};
+use crate::trajectory::{Knot, Trajectory};
+use crate::types::Vec3;
+use thiserror::Error;
+
+/// Rounding that a bound may be exceeded by [its own unit].
+const ROUNDING: f64 = 1e-6;
+/// Largest jump at a splice [m, m/s, m/s^2]; rounding of coordinates of some hundred metres.
+const JUMP: f64 = 1e-8;
+/// The heading may turn this much faster than planned while the start's offset fades: the limit is
+/// for comfort of cameras and thrust margin, not for safety.
+const HEADING_HEADROOM: f64 = 1.5;
+
+/// What is wrong with a solved trajectory.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CheckError {
+    /// It does not begin at the splice or end on the plan.
+    #[error("it does not join the {0} of the replan")]
+    Join(&'static str),
+    /// A limit is exceeded.
+    #[error("{quantity} exceeds its limit by {by:.4} in the segment from {t:.2} s")]
+    Limit {
+        /// Which.
+        quantity: &'static str,
+        /// By how much [its unit].
+        by: f64,
+        /// Start of the segment [s].
+        t: f64,
+    },
+    /// It leaves the workspace.
+    #[error("it leaves the workspace by {by:.3} m in the segment from {t:.2} s")]
+    Workspace {
+        /// How far [m].
+        by: f64,
+        /// Start of the segment [s].
+        t: f64,
+    },
+    /// It touches an obstacle.
+    #[error("it touches obstacle {index} in the segment from {t:.2} s")]
+    Obstacle {
+        /// Its place in the plan.
+        index: usize,
+        /// Start of the segment [s].
+        t: f64,
+    },
+    /// It comes too close to a peer's plan.
+    #[error("it comes within {distance:.3} m of drone {index} in the segment from {t:.2} s")]
+    Peer {
+        /// Its place in the plan.
+        index: usize,
+        /// Distance [m].
+        distance: f64,
+        /// Start of the segment [s].
+        t: f64,
+    },
+}
+
+/// Checks a replan of drone `own` from `start` to the fleet plan.
+pub fn check(trajectory: &Trajectory, start: &Knot, scene: &Scene<'_>, own: usize) -> Result<(), CheckError> {
+    joins(trajectory, start, &scene.trajectories[own])?;
+    limits(trajectory, scene)?;
+    workspace(trajectory, scene)?;
+    for segment in 0..trajectory.segments() {
+        let q = trajectory.quintic(segment);
+        for (index, obstacle) in scene.obstacles.iter().enumerate() {
+            if min_outside(&q, obstacle, ROUNDING) <= 0.0 {
+                return Err(CheckError::Obstacle { index, t: trajectory.knots()[segment].t });
+            }
+        }
+    }
+    (0..scene.trajectories.len()).filter(|i| *i != own).try_for_each(|i| peer(trajectory, scene, i))
+}
+
+fn joins(trajectory: &Trajectory, start: &Knot, plan: &Trajectory) -> Result<(), CheckError> {
+    let (first, last) = (&trajectory.knots()[0], &trajectory.knots()[trajectory.segments()]);
+    let same = |k: &Knot, (p, v, a): (Vec3, Vec3, Vec3)| {
+        (k.p - p).amax().max((k.v - v).amax()).max((k.a - a).amax()) <= JUMP
+    };
+    if first.t != start.t || !same(first, (start.p, start.v, start.a)) {
+        return Err(CheckError::Join("start"));
+    }
+    if !same(last, plan.motion(last.t)) {
+        return Err(CheckError::Join("end"));
+    }
+    Ok(())
+}
+
+fn limits(trajectory: &Trajectory, scene: &Scene<'_>) -> Result<(), CheckError> {
+    let knots = trajectory.knots();
+    let times: Vec<f64> = knots.iter().map(|k| k.t).collect();
+    let speed = Allowance::velocity(scene.limits, &knots[0], &times);
+    let push = Allowance::acceleration(scene.limits, &knots[0], &times);
+    for (i, pair) in knots.windows(2).enumerate() {
+        let (t, h) = (pair[0].t, pair[1].t - pair[0].t);
+        let q = trajectory.quintic(i);
+        for axis in 0..3 {
+            let (v, a) = (q.velocity_points(), q.acceleration_points());
+            let v = excess(&v.map(|c| c[axis]), |s| speed.at(axis, t + s * h));
+            let a = excess(&a.map(|c| c[axis]), |s| push.at(axis, t + s * h));
+            for (quantity, by) in [("velocity", v), ("acceleration", a)] {
+                if by > ROUNDING {
+                    return Err(CheckError::Limit { quantity, by, t });
+                }
+            }
+        }
+        let by = max_abs(&trajectory.heading_quintic(i).velocity_points(), 0.0).x
+            - HEADING_HEADROOM * scene.limits.psi_rate_max;
+        if by > ROUNDING {
+            return Err(CheckError::Limit { quantity: "heading rate", by, t });
+        }
+    }
+    Ok(())
+}
+
+/// Upper bound of `|x(s)| - bound(s)`, with a bound that is linear in s in [0, 1].
+fn excess<const N: usize>(coefficients: &[f64; N], bound: impl Fn(f64) -> f64) -> f64 {
+    let room = |sign: f64| {
+        let c =
+            std::array::from_fn::<f64, N, _>(|i| bound(i as f64 / (N - 1) as f64) - sign * coefficients[i]);
+        min_value(c, 0.0)
+    };
+    -room(1.0).min(room(-1.0))
+}
+
+/// Inside every face, or, where the start is beyond a face or cannot stop before it, no farther out
+/// than half of the acceleration limit makes unavoidable, and back inside in the time that takes.
+fn workspace(trajectory: &Trajectory, scene: &Scene<'_>) -> Result<(), CheckError> {
+    let a = 0.5 * scene.limits.a_max;
+    let start = &trajectory.knots()[0];
+    let mut depth = 0.0_f64;
+    let mut time = 0.0_f64;
+    for face in scene.workspace.faces() {
+        let (d, u) = (face.a.dot(&start.p) - face.b, face.a.dot(&start.v));
+        depth = depth.max(recovery_depth(d, u, a));
+        time = time.max(recovery_time(d, u, a));
+    }
+    let until = back_by(trajectory, time);
+    for (i, k) in trajectory.knots().iter().take(trajectory.segments()).enumerate() {
+        let allowed = if k.t < until - 1e-9 { depth } else { 0.0 };
+        let by = -min_inside(&trajectory.quintic(i), scene.workspace, -allowed);
+        if by > allowed + ROUNDING {
+            return Err(CheckError::Workspace { by, t: k.t });
+        }
+    }
+    Ok(())
+}
+
+/// `delta_min` from the peer's fleet plan, or, while the start makes that impossible, no closer than
+/// half of the acceleration limit makes unavoidable.
+fn peer(trajectory: &Trajectory, scene: &Scene<'_>, index: usize) -> Result<(), CheckError> {
+    let other = &scene.trajectories[index];
+    let a = 0.5 * scene.limits.a_max;
+    let start = &trajectory.knots()[0];
+    let (p, v, _) = other.motion(start.t);
+    let apart = start.p - p;
+    let distance = apart.norm();
+    let closing = if distance > 1e-6 { -apart.dot(&(start.v - v)) / distance } else { 0.0 };
+    let short = scene.limits.delta_min - distance;
+    let allowed = recovery_depth(short, closing, a).max(0.0);
+    let until = back_by(trajectory, recovery_time(short, closing, a));
+    for k in trajectory.knots().windows(2) {
+        let least = scene.limits.delta_min - if k[0].t < until - 1e-9 { allowed } else { 0.0 };
+        let distance = trajectory.min_distance(other, k[0].t, k[1].t, least);
+        if distance < least - ROUNDING {
+            return Err(CheckError::Peer { index, distance, t: k[0].t });
+        }
+    }
+    Ok(())
+}
+
+/// The knot by which the bounds must hold again, `time` after the start.
+fn back_by(trajectory: &Trajectory, time: f64) -> f64 {
+    let times: Vec<f64> = trajectory.knots().iter().map(|k| k.t).collect();
+    knot_after(&times, times[0] + time)
+}
