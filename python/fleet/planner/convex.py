@@ -1,0 +1,173 @@
+"""The fast path: sequential convex steps, each a quadratic program with separating planes held.
+
+Every step is an inner approximation: planes found at the last trajectory stay valid for it, so the
+margin r never falls from step to step (convex-concave procedure; Lipp and Boyd 2016). First r is
+maximised, then energy is minimised at the r reached.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from . import clearance as near
+from .knots import Array
+from .rows import Block, energy, stack
+from .setup import SMOOTH, Setup, warm_start
+from .solver import solve
+
+Progress = Callable[[str, float], None]
+
+#: Most convex steps of one attempt.
+STEPS = 14
+#: r counts as at its bound, or as no longer rising, within this [m].
+TOLERANCE = 1e-3
+#: Clearance given up so that energy can be saved [m].
+GIVEN_UP = 2e-3
+#: Energy steps after r stands.
+POLISH = 2
+#: Weight of smoothness while r is maximised; small against one metre of r.
+SOFT = 1e-4
+#: Tilts of the planes of a pair in conflict that are tried: none, over, under, beside.
+LIFTS = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Reached: r [m] over all, worst clause, share of limits, least margin over the tube [m]."""
+
+    r: float
+    clause: str
+    share: float
+    tube: float
+
+
+@dataclass
+class Steps:
+    """The constraints of a setup and the margins they reach."""
+
+    setup: Setup
+    within: list[near.Watch]
+    beyond: list[near.Watch]
+    apart: list[near.Watch]
+    bounds: near.Bounds
+
+    @classmethod
+    def of(cls, setup: Setup) -> Steps:
+        """No rows posed yet."""
+        within, beyond, apart = near.watches(setup.problem, setup.grid)
+        return cls(setup, within, beyond, apart, near.Bounds.none_posed(setup.problem, setup.grid))
+
+    def rows(self, x: Array, lift: Array | None = None) -> list[Block]:
+        """Rows that can matter near the trajectory `x`."""
+        wanted, tube = self.setup.bound, self.setup.problem.tube
+        blocks = [*(b for _, b in self.setup.visits), *self.bounds.rows(x)]
+        for w in self.within:
+            blocks += near.inside_rows(w, x, wanted)
+        for w in self.beyond:
+            blocks += near.outside_rows(w, x, wanted)
+        for w in self.apart:
+            blocks += near.apart_rows(w, x, wanted, tube, lift)
+        return blocks
+
+    def margins(self, x: Array) -> Margins:
+        """Margins of the trajectory over everything, posed or not."""
+        wanted, tube = self.setup.bound, self.setup.problem.tube
+        found: list[tuple[float, str]] = [(wanted, "")]
+        least = np.inf
+        for w in self.within:
+            found.append((float(near.inside_margin(w, x).min()), w.clause))
+        for w in self.beyond:
+            found.append((float(near.outside_margin(w, x)[0].min()), w.clause))
+        least = min(least, *(m for m, _ in found)) - tube
+        for w in self.apart:
+            margin, asked = near.apart_margin(w, x)[0], near.pair_least(w, x, tube)
+            found.append((float((margin - np.maximum(asked - wanted, 0.0)).min()), w.clause))
+            least = min(least, float((margin - asked).min()))
+        for clause, block in self.setup.visits:
+            slack = block.rhs - (block.vals * x[block.cols]).sum(axis=1)
+            found.append((float(slack.min()), clause))
+            least = min(least, float(slack.min()) - tube)
+        r, worst = min(found)
+        return Margins(r, worst, self.bounds.worst(x), least)
+
+    def step(self, x: Array, hold: float | None, lift: Array | None = None) -> Array | None:
+        """One convex step from `x`: maximise r, or hold it at `hold` and minimise energy."""
+        size = self.setup.grid.size
+        below = self.rows(x, lift)
+        weight = SOFT if hold is None else 1.0
+        smooth = energy(self.setup.grid, {k: weight * w for k, w in SMOOTH.items()})
+        quadratic = sparse.csc_matrix(sparse.block_diag([smooth, sparse.csc_matrix((1, 1))]))
+        linear = np.zeros(size + 1)
+        linear[size] = 0.0 if hold is not None else -1.0
+        slack = np.array([[size]])
+        below = [*below, Block(np.ones((1, 1)), slack, np.array([self.setup.bound]), np.zeros(1))]
+        if hold is not None:
+            below.append(Block(-np.ones((1, 1)), slack, np.array([-hold]), np.zeros(1)))
+        found = solve(quadratic, linear, stack(self.setup.equal, size), stack(below, size))
+        return None if found is None else found[:size]
+
+
+def better(a: Margins, b: Margins) -> bool:
+    """Whether a is usable and has the larger r, or b is not usable."""
+    return (a.share <= 1.0, a.r) > (b.share <= 1.0, b.r)
+
+
+def climb(steps: Steps, x: Array, lift: Sequence[float]) -> tuple[Array, Margins, int]:
+    """Maximise r from `x`; returns the best trajectory, its margins, and the number of steps."""
+    best, top = x, steps.margins(x)
+    tilt = np.array(lift) if any(lift) else None
+    stalled = 0
+    for count in range(1, STEPS + 1):
+        moved = steps.step(x, None, tilt if count == 1 else None)
+        if moved is None:
+            return best, top, count
+        x, now = moved, steps.margins(moved)
+        stalled = 0 if now.r > top.r + TOLERANCE or top.share > 1 else stalled + 1
+        if better(now, top):
+            best, top = x, now
+        if top.share <= 1 and (top.r >= steps.setup.bound - TOLERANCE or stalled >= 2):
+            break
+    return best, top, count
+
+
+def polish(steps: Steps, x: Array, reached: Margins) -> tuple[Array, Margins, int]:
+    """Minimise energy at r within `GIVEN_UP` of what was reached."""
+    hold = reached.r - GIVEN_UP
+    best, top = x, reached
+    for count in range(1, POLISH + 3):
+        moved = steps.step(best, hold)
+        if moved is None:
+            return best, top, count
+        now = steps.margins(moved)
+        if now.share <= 1 and now.r >= hold - TOLERANCE:
+            best, top = moved, now
+            if count >= POLISH:
+                break
+        # Something that was not posed was passed: pose it too, from the trajectory that passed it.
+        else:
+            steps.rows(moved)
+    return best, top, count
+
+
+def optimise(setup: Setup, progress: Progress | None = None) -> tuple[Array, Margins, int]:
+    """The best trajectory over the tilts of `LIFTS` (until one is at the bound), then polished."""
+    start = warm_start(setup)
+    chosen: tuple[Array, Margins, Steps] | None = None
+    count = 0
+    for lift in LIFTS:
+        steps = Steps.of(setup)
+        x, margins, used = climb(steps, start, lift)
+        count += used
+        if chosen is None or better(margins, chosen[1]):
+            chosen = (x, margins, steps)
+        if progress is not None:
+            progress("solve", chosen[1].r)
+        if (margins.share <= 1 and margins.r >= setup.bound - 10 * TOLERANCE) or not setup.problem.pairs():
+            break
+    assert chosen is not None
+    x, margins, used = polish(chosen[2], chosen[0], chosen[1]) if chosen[1].share <= 1 else (*chosen[:2], 0)
+    return x, margins, count + used

@@ -1,0 +1,78 @@
+"""The planner from end to end: scenario to certified plan."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fleet.errors import InfeasibleError
+
+from . import convex
+from .ceiling import rho_bound
+from .problem import Problem, problem
+from .result import PlanResult, result, squared_acceleration, trajectory
+from .schedule import schedule
+from .setup import Setup, setup
+
+if TYPE_CHECKING:
+    from fleet.scenario import Scenario
+
+Progress = Callable[[str, float], None]
+
+
+def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = "auto") -> PlanResult:
+    """Plan a scenario: assign, route, optimise, certify.
+
+    `method` is "convex" (sequential convex steps), "nlp" (the nonlinear program, IPOPT) or "auto":
+    convex, and the nonlinear program for clauses that have no normal form. `progress(stage, rho)` is
+    called at every stage. The same scenario gives the same bytes.
+
+    Raises InfeasibleError, naming a clause, when the mission cannot hold or nothing was found that
+    keeps the tube's margins; ValueError for an unknown method.
+    """
+    if method not in ("auto", "convex", "nlp"):
+        raise ValueError(f"method is {method!r}; legal are auto, convex and nlp")
+    tell = progress or (lambda stage, rho: None)
+    timings = {"process": time.process_time()}
+    mark = time.perf_counter()
+    task = problem(scenario)
+    bound = rho_bound(task)
+    tell("route", bound)
+    way = schedule(task, min(bound, WIDEST))
+    timings["route"], mark = lap(mark)
+    stage = setup(task, way, min(bound, WIDEST))
+    tell("build", bound)
+    timings["build"], mark = lap(mark)
+    x, margins, _ = convex.optimise(stage, progress)
+    used = "convex"
+    refuse(task, stage, margins)
+    timings["solve"], mark = lap(mark)
+    tell("certify", margins.r)
+    tracks = [trajectory(task, way, stage.grid, x, d) for d in range(len(task.ids))]
+    energy = squared_acceleration(stage.grid, x)
+    out = result(scenario, task, way, tracks, bound=bound, method=used, int_a2=energy, timings=timings)
+    timings["certify"], mark = lap(mark)
+    return out
+
+
+#: Clearance that is worth while when no clause bounds rho [m].
+WIDEST = 5.0
+
+
+def lap(mark: float) -> tuple[float, float]:
+    """Seconds since `mark`, and the new mark."""
+    now = time.perf_counter()
+    return now - mark, now
+
+
+def refuse(task: Problem, stage: Setup, margins: convex.Margins) -> None:
+    """Raise InfeasibleError when limits or the margins of the tube are not kept."""
+    if margins.share > 1:
+        limits = f"v_max = {task.v_max:g} m/s and a_max = {task.a_max:g} m/s^2"
+        text = f"{limits} cannot be kept: the best found passes one by {100 * (margins.share - 1):.1f} %"
+        raise InfeasibleError(text, clause=margins.clause)
+    if margins.tube < -1e-6:
+        asked = f"{task.tube:g} m (pairs {2 * task.tube:g} m and more with closing speed)"
+        text = f"the best margin found is {margins.tube + task.tube:.2f} m, and the tube asks for {asked}"
+        raise InfeasibleError(text, clause=margins.clause)

@@ -1,0 +1,97 @@
+"""The planning problem as arrays, made once from a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .knots import Array
+from .spec import Invariant, Specification, specification
+
+if TYPE_CHECKING:
+    from fleet.scenario import Region, Scenario
+
+#: Share of the closing speed that the pair margin adds [s] (design.md, Tube).
+CLOSING = 0.02
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Regions are faces (n, 4): outward unit normal and offset [m]; drones are numbered in order.
+
+    `starts` (d, 3) [m], `psi` (d,) heading at the start [rad], `homes` region name per drone,
+    `headings` required heading per target [rad],
+    `segment` longest segment [s], `given` hand-made orders of targets, or None.
+    """
+
+    ids: tuple[str, ...]
+    starts: Array
+    psi: Array
+    homes: tuple[str, ...]
+    regions: Mapping[str, Array]
+    centers: Mapping[str, Array]
+    inradii: Mapping[str, float]
+    headings: Mapping[str, float | None]
+    workspace: str
+    obstacles: tuple[str, ...]
+    spec: Specification
+    horizon: float
+    sample: float
+    v_max: float
+    a_max: float
+    heading_rate: float
+    tube: float
+    segment: float
+    given: Mapping[str, tuple[str, ...]] | None
+
+    def number(self, drone: str) -> int:
+        """Index of a drone."""
+        return self.ids.index(drone)
+
+    def pairs(self) -> list[tuple[int, int, Invariant]]:
+        """Pairs of drones (a < b) that must keep apart, each once, with the invariant that says so."""
+        found: dict[tuple[int, int, float, tuple[float, float]], Invariant] = {}
+        for inv in self.spec.invariants:
+            if inv.kind == "apart":
+                a, b = sorted(self.number(d) for d in inv.drones)
+                found.setdefault((a, b, inv.value, inv.window), inv)
+        return [(a, b, inv) for (a, b, _, _), inv in found.items()]
+
+
+def faces_of(region: Region) -> Array:
+    """Faces (n, 4) of a scenario region."""
+    return np.column_stack([region.A, region.b])
+
+
+def problem(scenario: Scenario) -> Problem:
+    """The arrays of a scenario; its mission in normal form."""
+    named: dict[str, Region] = {scenario.workspace.name: scenario.workspace}
+    named |= {o.name: o for o in scenario.obstacles}
+    named |= {t.name: t for t in scenario.targets}
+    named |= {f"home.{d.id}": d.home for d in scenario.drones}
+    mission, limits = scenario.mission, scenario.limits
+    given = scenario.assignment
+    return Problem(
+        ids=tuple(d.id for d in scenario.drones),
+        starts=np.array([d.start for d in scenario.drones], dtype=float),
+        psi=np.array([d.pad_heading for d in scenario.drones], dtype=float),
+        homes=tuple(f"home.{d.id}" for d in scenario.drones),
+        regions={name: faces_of(r) for name, r in named.items()},
+        centers={name: np.asarray(r.center, dtype=float) for name, r in named.items()},
+        inradii={name: float(r.inradius) for name, r in named.items()},
+        headings={t.name: t.heading for t in scenario.targets},
+        workspace=scenario.workspace.name,
+        obstacles=tuple(o.name for o in scenario.obstacles),
+        spec=specification(scenario.clauses(), float(mission.T)),
+        horizon=float(mission.T),
+        sample=float(mission.T_s),
+        v_max=float(limits.v_max),
+        a_max=float(limits.a_max),
+        heading_rate=float(limits.heading_rate),
+        tube=float(limits.tube),
+        segment=float(scenario.planner.segment),
+        given=None if given is None else {d: tuple(order) for d, order in given.items()},
+    )

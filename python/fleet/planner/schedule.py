@@ -1,0 +1,240 @@
+"""From the problem to an itinerary: who visits what and when, along which way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from fleet.assign import Legs, assign
+from fleet.errors import InfeasibleError
+from fleet.route import Network, leg_time, network, reach, spread, turn_time
+
+from .knots import Array
+from .problem import Problem
+from .spec import Visit
+
+#: Factors on rest-to-rest leg times, tried in turn: room for smooth flight first.
+EASE = (1.4, 1.15, 1.0)
+#: Share of the mission that visits keep from the ends of their windows, where time allows.
+SPARE = 0.04
+#: Shares of the wanted clearance at which routes are sought, the widest first.
+CLEARANCE = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """One visit of one drone: at time `t` [s] in `region` at `point` (3,) [m], for `dwell` [s]."""
+
+    visit: Visit
+    region: str
+    point: Array
+    t: float
+
+
+@dataclass(frozen=True)
+class Itinerary:
+    """Stops of every drone in order, and the polyline of every leg (the last one goes home)."""
+
+    stops: tuple[tuple[Stop, ...], ...]
+    paths: tuple[tuple[Array, ...], ...]
+
+
+@dataclass(frozen=True)
+class Map:
+    """Every place that a leg can start or end at, numbered, and the ways between them.
+
+    `start` and `home` (d,), `place[d][e]` number of the region in which drone d would do visit e, or -1.
+    """
+
+    ways: Network
+    points: Array
+    names: tuple[str, ...]
+    start: tuple[int, ...]
+    home: tuple[int, ...]
+    place: tuple[tuple[int, ...], ...]
+
+
+def survey(problem: Problem, bound: float) -> Map:
+    """Ways between all places at the widest clearance that still connects every drone and visit."""
+    n = len(problem.ids)
+    regions = sorted({r for v in problem.spec.visits for _, r in v.options} | set(problem.homes))
+    points = np.vstack([problem.starts, *(problem.centers[r][None] for r in regions)])
+    number = {r: n + k for k, r in enumerate(regions)}
+    place = tuple(
+        tuple(next((number[r] for d, r in v.options if d == name), -1) for v in problem.spec.visits)
+        for name in problem.ids
+    )
+    home = tuple(number[r] for r in problem.homes)
+    names = (*(f"start of {d}" for d in problem.ids), *regions)
+    obstacles = [problem.regions[o] for o in problem.obstacles]
+    needed = {(d, p) for d in range(n) for p in (*place[d], home[d]) if p >= 0}
+    for share in CLEARANCE:
+        ways = network(points, problem.regions[problem.workspace], obstacles, share * bound)
+        if all(ways.path(d, p) is not None for d, p in needed):
+            break
+    return Map(ways, points, names, tuple(range(n)), home, place)
+
+
+def heading_at(problem: Problem, name: str, drone: int) -> float | None:
+    """Heading required at a place [rad], if any; at the start the pad's."""
+    return float(problem.psi[drone]) if name.startswith("start of ") else problem.headings.get(name)
+
+
+def between(problem: Problem, world: Map, drone: int, i: int, j: int, ease: float | None) -> float:
+    """Least time [s] of a leg from place i to j: flight and turn; `ease` None flies through at v_max."""
+    path = world.ways.path(i, j) if i >= 0 and j >= 0 else None
+    if path is None:
+        return np.inf
+    flight = leg_time(reach(path), problem.v_max, problem.a_max, rest=ease is not None) * (ease or 1.0)
+    a, b = (heading_at(problem, world.names[k], drone) for k in (i, j))
+    turn = 0.0 if a is None or b is None else turn_time(shortest_turn(a, b), problem.heading_rate)
+    return max(flight, turn)
+
+
+def shortest_turn(a: float, b: float) -> float:
+    """Angle [rad] from heading a to b the short way, in (-pi, pi]; half turns go counter-clockwise."""
+    turn = (b - a) % (2 * np.pi)
+    return float(turn - 2 * np.pi if turn > np.pi + 1e-9 else turn)
+
+
+def leg_times(problem: Problem, world: Map, ease: float | None) -> Legs:
+    """All leg times of the assignment; hand-made assignments forbid the other drones."""
+    visits = problem.spec.visits
+    drones, n = len(problem.ids), len(visits)
+    first, last = np.full((drones, n), np.inf), np.full((drones, n), np.inf)
+    middle = np.full((drones, n, n), np.inf)
+    for d in range(drones):
+        places = world.place[d]
+        for e in range(n):
+            if places[e] < 0 or not permitted(problem, d, visits[e]):
+                continue
+            first[d, e] = between(problem, world, d, world.start[d], places[e], ease)
+            last[d, e] = between(problem, world, d, places[e], world.home[d], ease)
+            for f in range(n):
+                if f != e and places[f] >= 0:
+                    middle[d, e, f] = between(problem, world, d, places[e], places[f], ease)
+    idle = np.array([between(problem, world, d, world.start[d], world.home[d], ease) for d in range(drones)])
+    windows = np.array([v.window for v in visits], dtype=float).reshape(n, 2)
+    dwell = np.array([v.dwell for v in visits])
+    return Legs(first, middle, last, idle, windows, dwell, problem.horizon)
+
+
+def permitted(problem: Problem, drone: int, visit: Visit) -> bool:
+    """Whether a hand-made assignment, if there is one, leaves this visit to this drone."""
+    if problem.given is None:
+        return True
+    name = problem.ids[drone]
+    region = next((r for d, r in visit.options if d == name), None)
+    mine = problem.given.get(name, ())
+    return region in mine or not any(region in order for order in problem.given.values())
+
+
+def by_hand(problem: Problem, orders: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Orders of visits with the hand-made order of targets put in where there is one."""
+    if problem.given is None:
+        return orders
+    out = []
+    for d, name in enumerate(problem.ids):
+        wanted = problem.given.get(name, ())
+        region = {e: next(r for k, r in problem.spec.visits[e].options if k == name) for e in orders[d]}
+        rank = {e: wanted.index(r) if r in wanted else len(wanted) for e, r in region.items()}
+        out.append(tuple(sorted(orders[d], key=lambda e: rank[e])))
+    return out
+
+
+def schedule(problem: Problem, bound: float) -> Itinerary:
+    """The itinerary that the optimisation starts from, routed at a clearance of up to `bound` [m].
+
+    Raises InfeasibleError, naming the clause, when even flight through at v_max misses a window.
+    """
+    world = survey(problem, bound)
+    for ease in (*EASE, None):
+        legs = leg_times(problem, world, ease)
+        orders = assign(legs)
+        if orders is None:
+            continue
+        orders = by_hand(problem, orders)
+        timed = [event_times(problem, legs, d, order) for d, order in enumerate(orders)]
+        if all(t is not None for t in timed):
+            return itinerary(problem, world, orders, [t for t in timed if t is not None])
+    raise unreachable(problem, world)
+
+
+def event_times(problem: Problem, legs: Legs, drone: int, order: tuple[int, ...]) -> Array | None:
+    """Times of one drone's visits with the slack spread over its legs, or None."""
+    if not order:
+        return np.zeros(0)
+    least = [legs.first[drone, order[0]]]
+    least += [legs.between[drone, a, b] + legs.dwell[a] for a, b in pairwise(order)]
+    least.append(legs.last[drone, order[-1]] + legs.dwell[order[-1]])
+    windows = legs.windows[list(order)]
+    # A visit at the very end of its window would be missed by a drone that lags: keep off it if possible.
+    spared = np.maximum(windows[:, 1] - SPARE * problem.horizon, windows[:, 0])
+    early = np.column_stack([windows[:, 0], spared])
+    times = spread(np.array(least), early, problem.horizon, problem.sample)
+    return times if times is not None else spread(np.array(least), windows, problem.horizon, problem.sample)
+
+
+def itinerary(problem: Problem, world: Map, orders: list[tuple[int, ...]], times: list[Array]) -> Itinerary:
+    """Stops and polylines of every drone."""
+    stops, paths = [], []
+    for d, order in enumerate(orders):
+        at = [world.start[d], *(world.place[d][e] for e in order), world.home[d]]
+        found = [world.ways.path(i, j) for i, j in pairwise(at)]
+        paths.append(tuple(p for p in found if p is not None))
+        stops.append(
+            tuple(
+                Stop(problem.spec.visits[e], world.names[place], world.points[place], float(t))
+                for e, place, t in zip(order, at[1:-1], times[d], strict=True)
+            )
+        )
+    return Itinerary(tuple(stops), tuple(paths))
+
+
+def unreachable(problem: Problem, world: Map) -> InfeasibleError:
+    """Why no itinerary exists: the first clause that cannot hold, with the time that it would need."""
+    legs = leg_times(problem, world, None)
+    visits = problem.spec.visits
+    for e, visit in enumerate(visits):
+        soonest = float(legs.first[:, e].min())
+        name = visit.options[0][1]
+        if not np.isfinite(soonest):
+            text = f"no way from any drone to {name} clear of the obstacles"
+            return InfeasibleError(text, clause=visit.clause)
+        if soonest > visit.window[1] + 1e-9:
+            late = f"{name} cannot be reached by {visit.window[1]:.2f} s"
+            text = f"{late}: the nearest drone needs {soonest:.2f} s"
+            return InfeasibleError(f"{text} at v_max = {problem.v_max:g} m/s", clause=visit.clause)
+    open_windows = np.column_stack([legs.windows[:, 0], np.full(len(visits), np.inf)])
+    orders = assign(replace(legs, windows=open_windows, horizon=np.inf))
+    if orders is None:
+        clause = visits[0].clause if visits else None
+        text = "no drone can make every visit and come home clear of the obstacles"
+        return InfeasibleError(text, clause=clause)
+    return too_late(problem, legs, by_hand(problem, orders))
+
+
+def too_late(problem: Problem, legs: Legs, orders: list[tuple[int, ...]]) -> InfeasibleError:
+    """The first visit, or coming home, that the best tour without windows makes too late."""
+    for d, order in enumerate(orders):
+        clock, before = 0.0, -1
+        for e in order:
+            leg = legs.first[d, e] if before < 0 else legs.between[d, before, e]
+            clock = max(clock + float(leg), float(legs.windows[e, 0]))
+            visit = problem.spec.visits[e]
+            if clock > visit.window[1] + 1e-9:
+                region = dict(visit.options)[problem.ids[d]]
+                text = f"{region} cannot be reached by {visit.window[1]:.2f} s after the other visits"
+                why = f"{problem.ids[d]} needs {clock:.2f} s at v_max = {problem.v_max:g} m/s"
+                return InfeasibleError(f"{text}: {why}", clause=visit.clause)
+            clock, before = clock + visit.dwell, e
+        clock += float(legs.last[d, before]) if before >= 0 else float(legs.idle[d])
+        if clock > problem.horizon + 1e-9:
+            clause = next((h.clause for h in problem.spec.homes if h.drone == problem.ids[d]), None)
+            text = f"{problem.ids[d]} cannot be home by T = {problem.horizon:.2f} s: needs {clock:.2f} s"
+            return InfeasibleError(f"{text} at v_max = {problem.v_max:g} m/s", clause=clause)
+    visit = problem.spec.visits[0]
+    text = "the visits do not fit into their windows at v_max and a_max with the turns that headings need"
+    return InfeasibleError(text, clause=visit.clause)
