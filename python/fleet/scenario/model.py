@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from fleet.scenario.region import Array, Region
+from fleet.scenario.polyhedron import Array
+from fleet.scenario.region import Region
 from fleet.scenario.tables import Disturbance, Limits, Mission, Planner, Replan, Wind
 from fleet.stl import Clause, Vocabulary, default_formula, parse
 

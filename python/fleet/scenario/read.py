@@ -23,6 +23,7 @@ class Problems:
     """The problems of one file, in the order in which they are found."""
 
     def __init__(self, file: str) -> None:
+        """For the file of this name."""
         self.file = file
         self.found: list[Problem] = []
 
@@ -38,6 +39,7 @@ class Tables:
     """
 
     def __init__(self, document: Mapping[str, Any], problems: Problems) -> None:
+        """Reads each table of a TOML document; what cannot be read goes to `problems`."""
         self._document = document
         self._problems = problems
         for key in document.keys() - {*SINGLE, *REPEATED}:
@@ -59,6 +61,12 @@ class Tables:
         """How many tables `[[key]]` the file has, readable or not."""
         entries = self._document.get(key, [])
         return len(entries) if isinstance(entries, list) else 1
+
+    @property
+    def complete(self) -> bool:
+        """Whether every obstacle, target and drone of the file could be read."""
+        read = {"obstacle": len(self.obstacles), "target": len(self.targets), "drone": len(self.drones)}
+        return all(count == self.entries(key) for key, count in read.items())
 
     def _one(self, key: str, table: type[T], *, needed: bool = False) -> T | None:
         if key not in self._document and needed:
@@ -105,20 +113,19 @@ def read(path: Path) -> tuple[Tables, Problems]:
         with path.open("rb") as file:
             document = tomllib.load(file)
     except FileNotFoundError:
-        raise ScenarioError([Problem("missing_file", str(path), "", "no such file")]) from None
+        code, message = "missing_file", "no such file"
     except OSError as error:
-        raise ScenarioError([Problem("unreadable", str(path), "", error.strerror or str(error))]) from None
+        code, message = "unreadable", error.strerror or str(error)
     except UnicodeDecodeError as error:
-        message = f"not TOML: byte {error.start} is not UTF-8 text"
-        raise ScenarioError([Problem("toml", str(path), "", message)]) from None
+        code, message = "toml", f"not TOML: byte {error.start} is not UTF-8 text"
     except tomllib.TOMLDecodeError as error:
-        raise ScenarioError([Problem("toml", str(path), "", f"not TOML: {error}")]) from None
+        code, message = "toml", f"not TOML: {error}"
     except RecursionError:
-        raise ScenarioError(
-            [Problem("toml", str(path), "", "not TOML that can be read: nested too deep")]
-        ) from None
-    problems = Problems(str(path))
-    return Tables(document, problems), problems
+        code, message = "toml", "not TOML that can be read: nested too deep"
+    else:
+        problems = Problems(str(path))
+        return Tables(document, problems), problems
+    raise ScenarioError([Problem(code, str(path), "", message)])
 
 
 def _translate(field: str, detail: ErrorDetails, table: type[BaseModel] | None) -> tuple[str, str, str]:
@@ -134,12 +141,22 @@ def _translate(field: str, detail: ErrorDetails, table: type[BaseModel] | None) 
         return "unknown_key", path, f"no such key; legal: {legal}"
     if kind == "shape":
         return "shape", path, detail["msg"]
-    context = detail.get("ctx", {})
-    message = detail["msg"].removeprefix("Input should be ").replace("Input should", "should")
-    if kind in {"too_short", "too_long"} and "actual_length" in context:
-        message = f"a list of {context.get('min_length', context.get('max_length'))} values"
     code = "value" if kind in _RANGES else "type"
-    return code, path, f"{_shown(given)} is not legal; must be {message.replace('a valid ', 'a ')}"
+    return code, path, f"{_shown(given)} is not legal; must be {_legal(detail)}"
+
+
+def _legal(detail: ErrorDetails) -> str:
+    """What would be legal, as the words after "must be"."""
+    kind, context = detail["type"], detail.get("ctx", {})
+    if kind in {"model_type", "dict_type"}:
+        return "a table"
+    if kind in {"tuple_type", "list_type"}:
+        return "a list"
+    if kind == "too_short":
+        return f"a list of at least {context['min_length']} values"
+    if kind == "too_long":
+        return f"a list of at most {context['max_length']} values"
+    return detail["msg"].removeprefix("Input should be ").replace("a valid ", "a ")
 
 
 _RANGES = {

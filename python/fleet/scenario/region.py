@@ -14,14 +14,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fleet.scenario.polyhedron import Array, GeometryError, corners, inradius, largest_ball
+
 Point = Sequence[float]
-
-
-class GeometryError(ValueError):
-    """Numbers that do not describe a bounded convex polyhedron with an inside."""
 
 
 class Region:
@@ -53,12 +49,13 @@ class Region:
         self.name = name
         self.A: Array = A / norms[:, None] + 0.0
         self.b: Array = b / norms + 0.0
-        self._center, self.inradius = ball or _largest_ball(self.A, self.b)
+        self._center, self.inradius = ball or largest_ball(self.A, self.b)
         self._vertices = vertices
         for array in (self.A, self.b, self._center):
             array.setflags(write=False)
 
     def __repr__(self) -> str:
+        """Its name and number of faces."""
         return f"{type(self).__name__}({self.name!r}, {len(self.b)} faces)"
 
     @property
@@ -69,7 +66,7 @@ class Region:
     @cached_property
     def vertices(self) -> Array:
         """Corners, shape (k, 3) [m], in no particular order."""
-        return self._vertices if self._vertices is not None else _corners(self.A, self.b, self.center)
+        return self._vertices if self._vertices is not None else corners(self.A, self.b, self.center)
 
     @cached_property
     def faces(self) -> list[dict[str, Any]]:
@@ -86,9 +83,9 @@ class Region:
 
     def overlaps(self, other: Region) -> bool:
         """Whether the two share more than a surface."""
-        return (
-            not (_separated(self, other) or _separated(other, self)) and _shared_inradius(self, other) > 1e-9
-        )
+        if _separated(self, other) or _separated(other, self):
+            return False
+        return inradius(np.vstack((self.A, other.A)), np.concatenate((self.b, other.b))) > 1e-9
 
     def covers(self, other: Region) -> bool:
         """Whether nothing of `other` reaches out of this region."""
@@ -110,8 +107,8 @@ def from_box(name: str, low: Point, high: Point) -> Region:
     A[0::2], A[1::2] = np.eye(3), -np.eye(3)
     b = np.empty(6)
     b[0::2], b[1::2] = hi, -lo
-    corners = np.array(list(product(*zip(lo, hi, strict=True))))
-    return Region(name, A, b, ball=(lo + (hi - lo) / 2, float(np.min(hi - lo)) / 2), vertices=corners)
+    ends = np.array(list(product(*zip(lo, hi, strict=True))))
+    return Region(name, A, b, ball=(lo + (hi - lo) / 2, float(np.min(hi - lo)) / 2), vertices=ends)
 
 
 def from_prism(name: str, base: Sequence[Point], low: float, high: float) -> Region:
@@ -124,12 +121,12 @@ def from_prism(name: str, base: Sequence[Point], low: float, high: float) -> Reg
         raise GeometryError(f"z must be [low, high] with low < high, not [{low:g}, {high:g}]")
     A2, b2 = _polygon_faces(np.array(base, dtype=float))
     A, b = _upright(A2, b2, low, high)
-    corners = np.array([(*map(float, xy), z) for xy in base for z in (low, high)])
-    return Region(name, A, b, vertices=corners)
+    ends = np.array([(*map(float, xy), z) for xy in base for z in (low, high)])
+    return Region(name, A, b, vertices=ends)
 
 
 def from_regular_prism(
-    name: str, center: Point, apothem: float, sides: int, low: float, high: float
+    name: str, center: Point, apothem: float, sides: int, *, low: float, high: float
 ) -> Region:
     """The upright prism over a regular polygon whose face normals are at k x 360/sides degrees.
 
@@ -148,8 +145,8 @@ def from_regular_prism(
     A, b = _upright(A2, A2 @ middle[:2] + apothem, low, high)
     reach = apothem / math.cos(turn / 2)
     ring = middle[:2] + reach * np.column_stack((np.cos(angles + turn / 2), np.sin(angles + turn / 2)))
-    corners = np.array([(x, y, z) for x, y in ring for z in (low, high)])
-    return Region(name, A, b, ball=(middle, min(apothem, (high - low) / 2)), vertices=corners)
+    ends = np.array([(x, y, z) for x, y in ring for z in (low, high)])
+    return Region(name, A, b, ball=(middle, min(apothem, (high - low) / 2)), vertices=ends)
 
 
 def _upright(A2: Array, b2: Array, low: float, high: float) -> tuple[Array, Array]:
@@ -157,75 +154,23 @@ def _upright(A2: Array, b2: Array, low: float, high: float) -> tuple[Array, Arra
     return A, np.concatenate((b2, [high, -low]))
 
 
-def _polygon_faces(corners: Array) -> tuple[Array, Array]:
+def _polygon_faces(base: Array) -> tuple[Array, Array]:
     """Outward unit normals and offsets of a convex polygon's edges."""
-    edges = np.roll(corners, -1, axis=0) - corners
+    edges = np.roll(base, -1, axis=0) - base
     following = np.roll(edges, -1, axis=0)
     turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
     angles = np.arctan2(turns, np.sum(edges * following, axis=1))
     # One turn in all: a star polygon turns the same way at each corner but more than once.
     once = math.isclose(abs(float(np.sum(angles))), 2 * math.pi, rel_tol=1e-6)
-    if len(corners) < 3 or not once or not (np.all(turns > 1e-9) or np.all(turns < -1e-9)):
+    if len(base) < 3 or not once or not (np.all(turns > 1e-9) or np.all(turns < -1e-9)):
         raise GeometryError("base must be a convex polygon: at least 3 corners in order, none on a line")
     side = 1.0 if turns[0] > 0 else -1.0
     normals = side * np.column_stack((edges[:, 1], -edges[:, 0]))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return normals, np.sum(normals * corners, axis=1)
-
-
-def _largest_ball(A: Array, b: Array) -> tuple[Array, float]:
-    """Chebyshev centre and radius by linear programming (Boyd and Vandenberghe 2004, section 8.5.1)."""
-    from scipy.optimize import linprog
-
-    for direction in np.vstack((np.eye(3), -np.eye(3))):
-        reach = linprog(-direction, A_ub=A, b_ub=b, bounds=(None, None), method="highs")
-        if reach.status == 2:
-            raise GeometryError("the polyhedron is empty: no point satisfies all of its faces")
-        if reach.status != 0:
-            raise GeometryError("the polyhedron is unbounded; add faces until it is closed on every side")
-    rows = np.column_stack((A, np.ones(len(b))))
-    found = linprog([0, 0, 0, -1], A_ub=rows, b_ub=b, bounds=[(None, None)] * 3 + [(0, None)], method="highs")
-    if found.status != 0 or found.x[3] < 1e-9:
-        raise GeometryError("the polyhedron has no inside: it is flat or empty")
-    radius = float(found.x[3])
-    return _middle(A, b - radius), radius
-
-
-def _middle(A: Array, b: Array) -> Array:
-    """The mean of the extreme points along the axes of {A x <= b}: one point where many are central."""
-    from scipy.optimize import linprog
-
-    directions = np.vstack((np.eye(3), -np.eye(3)))
-    slack = 1e-9  # the set of centres is often a single point, which rounding may have emptied
-    ends = [linprog(d, A_ub=A, b_ub=b + slack, bounds=(None, None), method="highs") for d in directions]
-    if any(end.status != 0 for end in ends):
-        raise GeometryError("the polyhedron is too badly scaled to find its centre")
-    center: Array = np.mean([end.x for end in ends], axis=0)
-    return center
-
-
-def _corners(A: Array, b: Array, inside: Array) -> Array:
-    from scipy.spatial import HalfspaceIntersection, QhullError
-
-    try:
-        corners = HalfspaceIntersection(np.column_stack((A, -b)), inside).intersections
-    except QhullError as error:
-        raise GeometryError("the corners of the polyhedron cannot be computed; it is too thin") from error
-    unique: Array = np.unique(np.round(corners, 9), axis=0)
-    return unique
+    return normals, np.sum(normals * base, axis=1)
 
 
 def _separated(region: Region, other: Region) -> bool:
     """Whether one face of `region` has all of `other` on its far side; exact for two boxes."""
     beyond = other.vertices @ region.A.T - region.b
     return bool(np.any(np.min(beyond, axis=0) >= -1e-9))
-
-
-def _shared_inradius(region: Region, other: Region) -> float:
-    """Radius of the largest ball inside both, 0 when there is none [m]."""
-    from scipy.optimize import linprog
-
-    A, b = np.vstack((region.A, other.A)), np.concatenate((region.b, other.b))
-    rows = np.column_stack((A, np.ones(len(b))))
-    found = linprog([0, 0, 0, -1], A_ub=rows, b_ub=b, bounds=[(None, None)] * 3 + [(0, None)], method="highs")
-    return float(found.x[3]) if found.status == 0 else 0.0

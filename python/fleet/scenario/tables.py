@@ -11,11 +11,13 @@ from pydantic_core import PydanticCustomError
 from fleet.scenario.region import Region, from_box, from_prism, from_regular_prism
 
 # A TOML array is a list; strict mode would refuse it for a tuple. The numbers inside stay strict.
-Vec3 = Annotated[tuple[float, float, float], Field(strict=False)]
-Vec2 = Annotated[tuple[float, float], Field(strict=False)]
-Interval = Annotated[tuple[float, float], Field(strict=False)]
+# The bound keeps squares and sums from overflowing; no mission is a million metres wide.
+Number = Annotated[float, Field(ge=-1e6, le=1e6)]
+Vec3 = Annotated[tuple[Number, Number, Number], Field(strict=False)]
+Vec2 = Annotated[tuple[Number, Number], Field(strict=False)]
+Interval = Annotated[tuple[Number, Number], Field(strict=False)]
 Corners = Annotated[tuple[Vec3, Vec3], Field(strict=False)]
-Positive = Annotated[float, Field(gt=0)]
+Positive = Annotated[float, Field(gt=0, le=1e6)]
 Heading = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
 
 
@@ -56,7 +58,7 @@ class Replan(Table):
 
 
 class Planner(Table):
-    """`[planner]`: longest polynomial segment [s], iterations and tolerance of the solver (paper: 2000, 1e-4)."""
+    """`[planner]`: longest polynomial segment [s]; iterations and tolerance of the solver (paper, sec. V)."""
 
     segment: float = Field(1.0, ge=0.05, le=10)
     max_iterations: int = Field(2000, ge=1, le=100_000)
@@ -69,7 +71,7 @@ class Prism(Table):
     z: Interval
     base: list[Vec2] | None = None
     center: Vec2 | None = None
-    apothem: float | None = None
+    apothem: Number | None = None
     sides: int | None = None
 
     @model_validator(mode="after")
@@ -84,7 +86,7 @@ class Polyhedron(Table):
     """All x with A x <= b, rows of any length."""
 
     A: list[Vec3] = Field(min_length=4, max_length=256)
-    b: list[float] = Field(min_length=4, max_length=256)
+    b: list[Number] = Field(min_length=4, max_length=256)
 
     @model_validator(mode="after")
     def _same_length(self) -> Polyhedron:
@@ -128,7 +130,9 @@ class Shape(Table):
             if prism.base is not None:
                 return from_prism(name, prism.base, *prism.z)
             assert prism.center and prism.apothem is not None and prism.sides is not None  # _one_kind
-            return from_regular_prism(name, prism.center, prism.apothem, prism.sides, *prism.z)
+            return from_regular_prism(
+                name, prism.center, prism.apothem, prism.sides, low=prism.z[0], high=prism.z[1]
+            )
         assert self.polyhedron is not None  # _exactly_one
         import numpy as np
 

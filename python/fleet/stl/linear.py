@@ -27,6 +27,7 @@ class LinearForm:
         return all(map(math.isfinite, (self.constant, *self.coordinates.values(), *self.distances.values())))
 
     def __add__(self, other: LinearForm) -> LinearForm:
+        """The sum; what cancels is left out."""
         return LinearForm(
             self.constant + other.constant,
             _sum(self.coordinates, other.coordinates),
@@ -34,6 +35,7 @@ class LinearForm:
         )
 
     def __sub__(self, other: LinearForm) -> LinearForm:
+        """The difference; what cancels is left out."""
         return self + other.scaled(-1.0)
 
     def scaled(self, factor: float, divisor: float = 1.0) -> LinearForm:

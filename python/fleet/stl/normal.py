@@ -68,14 +68,13 @@ class NormalForm:
 
     def kind(self, clause: str) -> Kind:
         """What the parts of the clause with this id are, `rest` when they are not all alike."""
-        kinds: set[Kind] = set()
-        if any(part.clause == clause for part in (*self.events, *self.gathers)):
-            kinds.add("event")
-        if any(part.clause == clause for part in self.invariants):
-            kinds.add("invariant")
-        if any(part.clause == clause for part in self.rest):
-            kinds.add("rest")
-        return kinds.pop() if len(kinds) == 1 else "rest"
+        owners: dict[Kind, set[str]] = {
+            "event": {event.clause for event in self.events} | {gather.clause for gather in self.gathers},
+            "invariant": {invariant.clause for invariant in self.invariants},
+            "rest": {part.clause for part in self.rest},
+        }
+        kinds = [kind for kind, clauses in owners.items() if clause in clauses]
+        return kinds[0] if len(kinds) == 1 else "rest"
 
 
 def normal_form(clauses: Iterable[Clause], T: float) -> NormalForm:

@@ -9,7 +9,8 @@ from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
 from fleet.errors import FormulaError
-from fleet.stl.build import Builder, Node
+from fleet.stl.arithmetic import Node
+from fleet.stl.build import Builder
 from fleet.stl.vocabulary import Clause, Vocabulary, is_name
 
 MAX_DEPTH = 64
@@ -77,7 +78,7 @@ def _tree(text: str) -> Node:
     try:
         return _parser().parse(text)
     except UnexpectedCharacters as error:
-        message = f"unexpected character {text[error.pos_in_stream]!r}"
+        message = f"unexpected character {error.char!r}"
         raise FormulaError(message, text, error.line, error.column) from None
     except UnexpectedToken as error:
         expected = ", ".join(sorted(_display(name) for name in error.accepts or error.expected))

@@ -10,9 +10,9 @@ from typing import Any
 Formula = dict[str, Any]
 """A formula in the serde form of `crates/core/src/formula/tree.rs`: `{"op": "always", "from": ...}`."""
 
-RESERVED = frozenset(
-    "workspace obstacles home T delta_min dist always eventually until not and or all some in outside G F U".split()
-)
+_OPERATORS = ("always", "eventually", "until", "G", "F", "U", "not", "and", "or", "all", "some")
+_PREDICATES = ("in", "outside", "dist", "workspace", "obstacles", "home", "T", "delta_min")
+RESERVED = frozenset((*_OPERATORS, *_PREDICATES))
 """Words with a meaning of their own in formulas; nothing else may be called so."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
