@@ -75,6 +75,8 @@ pub enum RejectCode {
     Separation,
     /// The trajectory does not begin over the pad, or does not end at rest.
     Ends,
+    /// The plan's own proof is missing, not positive, or says that the mission is violated.
+    Certificate,
     /// Not possible in this mode.
     Mode,
     /// A pre-flight check failed; the reason says which and what to do.
