@@ -1,6 +1,8 @@
 //! Random formulas, traces and trajectories for the property tests.
 #![allow(dead_code, missing_docs, clippy::unwrap_used)] // helpers of tests; each binary uses a part
 
+pub mod messages;
+
 use fleet_core::formula::{Axis, Comparison, Formula, Names, Term};
 use fleet_core::geometry::Polyhedron;
 use fleet_core::trajectory::{Knot, Trajectory};
@@ -27,12 +29,17 @@ pub fn drone() -> impl Strategy<Value = String> {
     prop_oneof![Just("d1".to_owned()), Just("d2".to_owned())]
 }
 
-fn region() -> impl Strategy<Value = String> {
+fn region_name() -> impl Strategy<Value = String> {
     prop_oneof![Just("box".to_owned()), Just("wedge".to_owned())]
 }
 
-/// Two drones, a box and a tetrahedron.
+/// Two drones and the regions.
 pub fn names() -> Names {
+    Names::new(vec!["d1".to_owned(), "d2".to_owned()], regions()).unwrap()
+}
+
+/// A box and a tetrahedron.
+pub fn regions() -> Vec<Region> {
     let a = Polyhedron::from_box(Vec3::new(-1.0, -2.0, -1.5), Vec3::new(2.0, 1.0, 0.5)).unwrap();
     let row = |x: f64, y: f64, z: f64, b: f64| fleet_core::geometry::HalfSpace { a: Vec3::new(x, y, z), b };
     let b = Polyhedron::try_from(vec![
@@ -42,12 +49,10 @@ pub fn names() -> Names {
         row(0.0, 0.0, -1.0, 1.0),
     ])
     .unwrap();
-    let regions = [("box", a), ("wedge", b)];
-    Names::new(
-        vec!["d1".to_owned(), "d2".to_owned()],
-        regions.into_iter().map(|(name, shape)| Region { name: name.to_owned(), shape }).collect(),
-    )
-    .unwrap()
+    [("box", a), ("wedge", b)]
+        .into_iter()
+        .map(|(name, shape)| Region { name: name.to_owned(), shape })
+        .collect()
 }
 
 pub fn predicate() -> impl Strategy<Value = Formula> {
@@ -55,8 +60,8 @@ pub fn predicate() -> impl Strategy<Value = Formula> {
     let axis = prop_oneof![Just(Axis::X), Just(Axis::Y), Just(Axis::Z)];
     let term = (drone(), axis, -2.0..2.0).prop_map(|(drone, axis, coef)| Term { drone, axis, coef });
     prop_oneof![
-        (drone(), region()).prop_map(|(drone, region)| Formula::In { drone, region }),
-        (drone(), region()).prop_map(|(drone, region)| Formula::Outside { drone, region }),
+        (drone(), region_name()).prop_map(|(drone, region)| Formula::In { drone, region }),
+        (drone(), region_name()).prop_map(|(drone, region)| Formula::Outside { drone, region }),
         (cmp, 0.5..4.0).prop_map(|(cmp, value)| Formula::Dist {
             a: "d1".to_owned(),
             b: "d2".to_owned(),
