@@ -1,5 +1,7 @@
 """Samples of a plan or a log as CSV, so that others can judge us."""
 
+from __future__ import annotations
+
 import csv
 import os
 from collections.abc import Iterator

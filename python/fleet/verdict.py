@@ -1,5 +1,7 @@
 """The verdict on a flown mission: exact robustness of every clause on what was really flown."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any

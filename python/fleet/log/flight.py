@@ -1,5 +1,7 @@
 """Reading a flight log into arrays."""
 
+from __future__ import annotations
+
 import base64
 import json
 from collections.abc import Iterator

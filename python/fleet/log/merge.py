@@ -1,5 +1,7 @@
 """Merging the logs of agents and simulator into one file that stands alone."""
 
+from __future__ import annotations
+
 import base64
 import heapq
 import json

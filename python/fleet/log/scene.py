@@ -1,5 +1,7 @@
 """Regions of a plan as triangles for Foxglove's 3-D panel."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

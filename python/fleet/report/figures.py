@@ -1,5 +1,7 @@
 """The paper's figures from a flight: scene, motion against bounds, mutual distance, robustness over time."""
 
+from __future__ import annotations
+
 from itertools import combinations
 from typing import Any
 
