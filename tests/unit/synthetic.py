@@ -54,7 +54,7 @@ def _part(plan: Any, drone: Any, path: Path, shift: Shift, landed: bool) -> Path
                 t,
                 {**_pose(row[:3] + shift(name, t)), "v": row[3:6].tolist(), "w": [0, 0, 0]},
             )
-            put(f"/{name}/reference", t, {**_pose(row[:3]), "v": row[3:6].tolist(), "a": row[6:9].tolist()})
+            put(f"/{name}/reference", t, {**_pose(row[:3]), "v": v, "a": row[6:9].tolist()})
             deviation = float(np.linalg.norm(shift(name, t)))
             setpoint = {"rates": [0, 0, 0], "thrust": 0.4, "hover_thrust": 0.4, "deviation": deviation}
             put(f"/{name}/setpoint", t, setpoint)
