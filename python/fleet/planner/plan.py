@@ -10,6 +10,7 @@ from fleet.errors import InfeasibleError
 
 from . import convex
 from .ceiling import rho_bound
+from .knots import Array
 from .problem import Problem, problem
 from .result import PlanResult, result, squared_acceleration, trajectory
 from .schedule import schedule
@@ -44,9 +45,8 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     stage = setup(task, way, min(bound, WIDEST))
     tell("build", bound)
     timings["build"], mark = lap(mark)
-    x, margins, _ = convex.optimise(stage, progress)
-    used = "convex"
-    refuse(task, stage, margins)
+    x, margins, used = optimise(stage, method, progress)
+    refuse(task, margins)
     timings["solve"], mark = lap(mark)
     tell("certify", margins.r)
     tracks = [trajectory(task, way, stage.grid, x, d) for d in range(len(task.ids))]
@@ -66,7 +66,24 @@ def lap(mark: float) -> tuple[float, float]:
     return now - mark, now
 
 
-def refuse(task: Problem, stage: Setup, margins: convex.Margins) -> None:
+def optimise(stage: Setup, method: str, progress: Progress | None) -> tuple[Array, convex.Margins, str]:
+    """Trajectories by the method asked for; "auto" takes the nonlinear program where convex steps do not do."""
+    if method == "nlp":
+        from . import nlp
+
+        x, margins, _ = nlp.optimise(stage, None, progress)
+        return x, margins, "nlp"
+    x, margins, _ = convex.optimise(stage, progress)
+    usable = margins.share <= 1 and margins.tube >= -1e-6
+    if method == "convex" or (usable and not stage.problem.spec.rest):
+        return x, margins, "convex"
+    from . import nlp
+
+    x, margins, _ = nlp.optimise(stage, x, progress)
+    return x, margins, "nlp"
+
+
+def refuse(task: Problem, margins: convex.Margins) -> None:
     """Raise InfeasibleError when limits or the margins of the tube are not kept."""
     if margins.share > 1:
         limits = f"v_max = {task.v_max:g} m/s and a_max = {task.a_max:g} m/s^2"

@@ -24,7 +24,8 @@ class Problem:
 
     `starts` (d, 3) [m], `psi` (d,) heading at the start [rad], `homes` region name per drone,
     `headings` required heading per target [rad],
-    `segment` longest segment [s], `given` hand-made orders of targets, or None.
+    `segment` longest segment [s], `c` sharpness of smooth robustness [1/m], `max_iterations` and
+    `tolerance` those of the nonlinear program, `given` hand-made orders of targets, or None.
     """
 
     ids: tuple[str, ...]
@@ -45,6 +46,9 @@ class Problem:
     heading_rate: float
     tube: float
     segment: float
+    c: float
+    max_iterations: int
+    tolerance: float
     given: Mapping[str, tuple[str, ...]] | None
 
     def number(self, drone: str) -> int:
@@ -93,5 +97,8 @@ def problem(scenario: Scenario) -> Problem:
         heading_rate=float(limits.heading_rate),
         tube=float(limits.tube),
         segment=float(scenario.planner.segment),
+        c=float(mission.c),
+        max_iterations=int(scenario.planner.max_iterations),
+        tolerance=float(scenario.planner.tolerance),
         given=None if given is None else {d: tuple(order) for d, order in given.items()},
     )

@@ -1,0 +1,271 @@
+"""The reference: one nonlinear program over the same knots, solved by IPOPT with MUMPS.
+
+Where a convex step holds separating planes fixed, here they are unknowns too: per piece and obstacle a
+convex combination of faces, per piece and pair a vector of at most unit length. Both conditions are
+smooth, hold in continuous time and never overstate the margin. Clauses without a normal form enter
+through the smooth robustness of smooth.py. Stage functions are built once and mapped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from . import clearance as near
+from .convex import GIVEN_UP, SOFT, TOLERANCE, Margins, Steps, better
+from .knots import KNOT, Array, Grid, Pieces, difference, hermite
+from .problem import Problem
+from .rows import Block, gram, stack
+from .setup import SMOOTH, Setup, warm_start
+from .smooth import Smooth
+
+Progress = Callable[[str, float], None]
+
+#: Sharpness of smooth robustness [1/m] as multiples of the mission's c, one solve each.
+SHARPER = (1.0, 4.0, 16.0)
+#: Solves with further pieces posed, when a solution passes what was not posed.
+ROUNDS = 3
+
+
+@dataclass
+class Program:
+    """Unknowns, constraints `low <= g <= high` and a first guess, in parts as they are added."""
+
+    unknowns: list[Any] = field(default_factory=list)
+    guess: list[Array] = field(default_factory=list)
+    low: list[Array] = field(default_factory=list)
+    high: list[Array] = field(default_factory=list)
+    g: list[Any] = field(default_factory=list)
+    g_low: list[Array] = field(default_factory=list)
+    g_high: list[Array] = field(default_factory=list)
+
+    def unknown(self, name: str, rows: int, columns: int, guess: Array, low: float, high: float) -> Any:
+        """A matrix of unknowns within bounds."""
+        symbol = ca.MX.sym(name, rows, columns)
+        self.unknowns.append(ca.vec(symbol))
+        self.guess.append(np.asarray(guess, dtype=float).reshape(rows, columns).ravel(order="F"))
+        self.low.append(np.full(rows * columns, low))
+        self.high.append(np.full(rows * columns, high))
+        return symbol
+
+    def constrain(self, expression: Any, low: float, high: float) -> None:
+        """`low <= expression <= high`, element by element."""
+        column = ca.vec(expression)
+        self.g.append(column)
+        self.g_low.append(np.full(column.numel(), low))
+        self.g_high.append(np.full(column.numel(), high))
+
+
+def stage() -> tuple[Any, Any]:
+    """Stage functions of one segment (two knots (9,), duration): derivative control points, and cost.
+
+    Control points of velocity (3, 5) [m/s] and acceleration (3, 4) [m/s^2]; cost as `SMOOTH` weighs.
+    """
+    first, second, h = ca.MX.sym("k0", KNOT), ca.MX.sym("k1", KNOT), ca.MX.sym("h")
+    local = ca.horzcat(ca.reshape(first, 3, 3), ca.reshape(second, 3, 3))
+    unit = hermite(np.ones(1))[0]
+    scale = ca.vertcat(1, h, h**2, 1, h, h**2)
+    points = (local * ca.repmat(scale.T, 3, 1)) @ unit.T
+    speed, acceleration, jerk = (points @ difference(k).T / h**k for k in (1, 2, 3))
+    cost = SMOOTH[2] * h * ca.sum1(ca.sum2((acceleration @ gram(3)) * acceleration))
+    cost += SMOOTH[3] * h * ca.sum1(ca.sum2((jerk @ gram(2)) * jerk))
+    derivatives = ca.Function("stage", [first, second, h], [speed, acceleration])
+    return derivatives, ca.Function("cost", [first, second, h], [cost])
+
+
+def control_points(x: Any, pieces: Pieces) -> list[Any]:
+    """Position control points of the pieces per axis, (6, m) expressions: sparse linear maps of x."""
+    m, size = len(pieces.start), x.shape[0]
+    rows = np.repeat(np.arange(6 * m), 6)
+    out = []
+    for axis in range(3):
+        columns = np.repeat(pieces.columns[:, axis::3], 6, axis=0).ravel()
+        matrix = triplets(rows, columns, pieces.maps.reshape(-1), (6 * m, size))
+        out.append(ca.reshape(matrix @ x, 6, m))
+    return out
+
+
+def triplets(rows: Array, columns: Array, values: Array, shape: tuple[int, int]) -> Any:
+    """A CasADi sparse matrix; explicit zeros are kept."""
+    return ca.DM.triplet([int(r) for r in rows], [int(c) for c in columns], ca.DM(values), *shape)
+
+
+def linear(x: Any, r: Any, blocks: list[Block], size: int) -> tuple[Any, Array]:
+    """Expressions of blocks of rows and their right-hand sides."""
+    matrix, rhs = stack(blocks, size)
+    coo = matrix.tocoo()
+    dm = triplets(coo.row, coo.col, coo.data, coo.shape)
+    return dm @ ca.vertcat(x, r), rhs
+
+
+def pose_limits(program: Program, task: Problem, grid: Grid, x: Any) -> Any:
+    """Limits of all segments by the mapped stage function; returns the cost of smoothness."""
+    derivatives, cost = stage()
+    total = ca.MX(0)
+    for d, times in enumerate(grid.times):
+        n = len(times)
+        knots = ca.reshape(x[grid.offsets[d] : grid.offsets[d] + KNOT * n], KNOT, n)
+        h = ca.DM(np.diff(times)).T
+        speed, acceleration = derivatives.map(n - 1)(knots[:, :-1], knots[:, 1:], h)
+        v, a = task.v_max * (1 - 1e-5), task.a_max * (1 - 1e-5)
+        program.constrain(speed, -v, v)
+        program.constrain(acceleration, -a, a)
+        total += ca.sum2(cost.map(n - 1)(knots[:, :-1], knots[:, 1:], h))
+    return total
+
+
+def pose_obstacles(program: Program, w: near.Watch, x: Any, r: Any, now: Array) -> None:
+    """Each posed piece beyond a convex combination of an obstacle's faces by r."""
+    index = np.flatnonzero(w.posed)
+    if len(index) == 0:
+        return
+    pieces, n = w.pieces[0].take(index), len(w.faces)
+    face = near.outside_margin(w, now)[1][index]
+    guess = np.full((n, len(index)), 0.1 / n)
+    guess[face, np.arange(len(index))] += 0.9
+    mix = program.unknown("mix", n, len(index), guess, 0.0, 1.0)
+    program.constrain(ca.sum1(mix), 1.0, 1.0)
+    normal = w.faces[:, :3].T @ mix
+    offset = w.faces[:, 3:].T @ mix
+    points = control_points(x, pieces)
+    reach = sum(points[k] * ca.repmat(normal[k, :], 6, 1) for k in range(3))
+    program.constrain(reach - ca.repmat(offset, 6, 1) - r, 0.0, np.inf)
+
+
+def pose_pairs(program: Program, w: near.Watch, x: Any, r: Any, now: Array, steps: Steps) -> None:
+    """Each posed piece of a pair apart along a vector of at most unit length."""
+    index = np.flatnonzero(w.posed)
+    if len(index) == 0:
+        return
+    normals = near.apart_margin(w, now)[1][index]
+    asked = near.pair_least(w, now, steps.setup.problem.tube)[index]
+    extra = np.maximum(asked - steps.setup.bound, 0.0)
+    along = program.unknown("along", 3, len(index), normals.T, -1.0, 1.0)
+    program.constrain(ca.sum1(along**2), 0.0, 1.0)
+    one, two = (control_points(x, p.take(index)) for p in w.pieces)
+    gap = sum((one[k] - two[k]) * ca.repmat(along[k, :], 6, 1) for k in range(3))
+    program.constrain(gap - ca.repmat(ca.DM(w.value + extra).T, 6, 1) - r, 0.0, np.inf)
+
+
+def pose_rest(program: Program, task: Problem, grid: Grid, x: Any, r: Any, c: Any) -> None:
+    """Smooth robustness of every part without a normal form at least r."""
+    if not task.spec.rest:
+        return
+    times = np.arange(round(task.horizon / task.sample) + 1) * task.sample
+    positions = {n: sampled(grid, x, d, times) for d, n in enumerate(task.ids)}
+    walk = Smooth(positions, task.regions, task.sample, c)
+    for part in task.spec.rest:
+        program.constrain(walk.at_start(part.formula) - r, 0.0, np.inf)
+
+
+def sampled(grid: Grid, x: Any, drone: int, times: Array) -> Any:
+    """Positions (n, 3) at `times` (n,) [s] as sparse linear maps of x."""
+    knots = grid.times[drone]
+    seg = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
+    h = np.diff(knots)[seg]
+    s = np.clip((times - knots[seg]) / h, 0.0, 1.0)[:, None, None]
+    maps = hermite(h)
+    for _ in range(5):
+        maps = maps[:, :-1] * (1 - s) + maps[:, 1:] * s
+    rows = np.repeat(np.arange(len(times)), 6)
+    axes = []
+    for axis in range(3):
+        columns = grid.offsets[drone] + KNOT * seg[:, None] + 3 * np.arange(6)[None, :] + axis
+        axes.append(triplets(rows, columns.ravel(), maps[:, 0].ravel(), (len(times), x.shape[0])) @ x)
+    return ca.horzcat(*axes)
+
+
+def build(steps: Steps, now: Array, margins: Margins) -> tuple[Program, Any, Any]:
+    """The program around the trajectory `now`, its objective and its parameters (weight, hold, c)."""
+    task, grid = steps.setup.problem, steps.setup.grid
+    program, size = Program(), grid.size
+    x = program.unknown("x", size, 1, now, -np.inf, np.inf)
+    r = program.unknown("r", 1, 1, np.array([min(margins.r, steps.setup.bound)]), -np.inf, steps.setup.bound)
+    p = ca.MX.sym("p", 3)
+    same, value = linear(x, r, steps.setup.equal, size)
+    program.constrain(same - value, 0.0, 0.0)
+    visits, value = linear(x, r, [b for _, b in steps.setup.visits], size)
+    program.constrain(visits - value, -np.inf, 0.0)
+    inside = [b for w in steps.within for b in near.inside_rows(w, now, steps.setup.bound)]
+    if inside:
+        rows, value = linear(x, r, inside, size)
+        program.constrain(rows - value, -np.inf, 0.0)
+    cost = pose_limits(program, task, grid, x)
+    for w in steps.beyond:
+        pose_obstacles(program, w, x, r, now)
+    for w in steps.apart:
+        pose_pairs(program, w, x, r, now, steps)
+    pose_rest(program, task, grid, x, r, p[2])
+    program.constrain(r - p[1], 0.0, np.inf)
+    return program, -r + p[0] * cost, p
+
+
+def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Array | None:
+    """One solve, sharpening smooth robustness if there is any; None unless IPOPT succeeded."""
+    task = steps.setup.problem
+    program, objective, p = build(steps, now, margins)
+    statement = {"x": ca.vertcat(*program.unknowns), "f": objective, "g": ca.vertcat(*program.g), "p": p}
+    options = {
+        "ipopt": {
+            "linear_solver": "mumps",
+            "max_iter": task.max_iterations,
+            "tol": task.tolerance,
+            "constr_viol_tol": 1e-7,
+            "acceptable_iter": 0,
+            "mu_strategy": "adaptive",
+            "print_level": 0,
+            "sb": "yes",
+        },
+        "print_time": False,
+    }
+    solver = ca.nlpsol("plan", "ipopt", statement, options)
+    guess = np.concatenate(program.guess)
+    for factor in SHARPER if task.spec.rest else (1.0,):
+        weight = SOFT if hold is None else 1.0
+        parameters = [weight, -1e3 if hold is None else hold, factor * task.c]
+        found = solver(
+            x0=guess,
+            p=parameters,
+            lbx=np.concatenate(program.low),
+            ubx=np.concatenate(program.high),
+            lbg=np.concatenate(program.g_low),
+            ubg=np.concatenate(program.g_high),
+        )
+        if solver.stats()["return_status"] != "Solve_Succeeded":
+            return None
+        guess = np.asarray(found["x"]).ravel()
+    return guess[: steps.setup.grid.size]
+
+
+def optimise(
+    setup: Setup, start: Array | None = None, progress: Progress | None = None
+) -> tuple[Array, Margins, int]:
+    """Maximise r, then minimise energy at the r reached, from the warm start or from `start`."""
+    steps = Steps.of(setup)
+    best = warm_start(setup) if start is None else start
+    top, count = steps.margins(best), 0
+    for hold in (False, True):
+        level = top.r - GIVEN_UP if hold else None
+        if hold and top.share > 1:
+            break
+        x = best
+        for _ in range(ROUNDS):
+            steps.rows(x)
+            found = solve(steps, best, top, level)
+            count += 1
+            if found is None:
+                break
+            now = steps.margins(found)
+            if progress is not None:
+                progress("solve", now.r)
+            good = now.share <= 1 and now.r >= level - TOLERANCE if level is not None else better(now, top)
+            if good:
+                best, top = found, now
+            x = found
+            if good and (level is not None or now.r >= setup.bound - TOLERANCE):
+                break
+    return best, top, count
