@@ -13,13 +13,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .knots import Array, Grid, Ints, Pieces, cut, merge, refine
+from .knots import Array, Grid, Ints, Pieces, cut, merge, refine, restriction
 from .problem import CLOSING, Problem
 from .rows import Block, derivative_points, half_spaces, limits, pieces_inside, separation
 from .spec import Invariant
 
 #: Pieces of a segment that may lie beyond different faces of one obstacle.
 PARTS = 2
+#: Factor on the tube's margin of pairs: closing speeds change from step to step.
+TUBE_EASE = 1.02
+#: Parts into which a piece is cut to measure its margin.
+FINE = 16
 #: Rows are posed where the clearance is within this of the wanted one [m]; the rest is checked after.
 NEAR = 1.5
 #: Limits are posed where a control point passes this share of them; the rest is checked after.
@@ -99,6 +103,19 @@ def outside_margin(w: Watch, x: Array) -> tuple[Array, Ints]:
     return least[np.arange(len(face)), face], face
 
 
+def outside_least(w: Watch, x: Array, wanted: float) -> float:
+    """Least margin over all pieces, those short of `wanted` cut finer: they may lie round a corner."""
+    margin, _ = outside_margin(w, x)
+    short = np.flatnonzero(margin < wanted)
+    if len(short) == 0:
+        return float(margin.min())
+    s = np.arange(FINE) / FINE
+    points = w.pieces[0].take(short).points(x)[:, None]
+    parts = restriction(s, s + 1 / FINE)[None] @ points
+    fine = (parts @ w.faces[:, :3].T - w.faces[:, 3]).min(axis=2).max(axis=2)
+    return float(min(fine.min(), np.delete(margin, short).min(initial=np.inf)))
+
+
 def outside_rows(w: Watch, x: Array, wanted: float) -> Iterator[Block]:
     """Rows that keep every near piece beyond the face it is farthest beyond now."""
     margin, face = outside_margin(w, x)
@@ -139,10 +156,12 @@ def pair_least(w: Watch, x: Array, tube: float) -> Array:
     return np.asarray(2 * tube + CLOSING * speed)
 
 
-def apart_rows(w: Watch, x: Array, wanted: float, tube: float, lift: Array | None = None) -> Iterator[Block]:
-    """Rows that keep near pieces on both sides of the best plane now, `wanted` raised to what the tube asks.
+def apart_rows(
+    w: Watch, x: Array, wanted: float, level: float, tube: float, lift: Array | None = None
+) -> Iterator[Block]:
+    """Rows that keep near pieces on both sides of the best plane now.
 
-    `lift` (3,) tilts the planes of pieces in conflict, to try another way past each other.
+    With r at `level` the margin is raised to what the tube asks. `lift` (3,) tilts the planes of pieces in conflict, to try another way past each other.
     """
     margin, normals = apart_margin(w, x)
     w.posed |= margin < wanted + 2 * NEAR
@@ -152,7 +171,7 @@ def apart_rows(w: Watch, x: Array, wanted: float, tube: float, lift: Array | Non
         tilted = mean + lift * (w.value + wanted)
         normals = np.where(clash[:, None], tilted / np.linalg.norm(tilted, axis=1, keepdims=True), normals)
     w.normals = normals
-    extra = np.maximum(pair_least(w, x, tube) - wanted, 0.0)
+    extra = np.maximum(TUBE_EASE * pair_least(w, x, tube) - level, 0.0)
     index = np.flatnonzero(w.posed)
     if len(index):
         one, two = (p.take(index) for p in w.pieces)

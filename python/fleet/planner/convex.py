@@ -61,8 +61,8 @@ class Steps:
         within, beyond, apart = near.watches(setup.problem, setup.grid)
         return cls(setup, within, beyond, apart, near.Bounds.none_posed(setup.problem, setup.grid))
 
-    def rows(self, x: Array, lift: Array | None = None) -> list[Block]:
-        """Rows that can matter near the trajectory `x`."""
+    def rows(self, x: Array, level: float, lift: Array | None = None) -> list[Block]:
+        """Rows that can matter near the trajectory `x` when r may reach `level`."""
         wanted, tube = self.setup.bound, self.setup.problem.tube
         blocks = [*(b for _, b in self.setup.visits), *self.bounds.rows(x)]
         for w in self.within:
@@ -70,7 +70,7 @@ class Steps:
         for w in self.beyond:
             blocks += near.outside_rows(w, x, wanted)
         for w in self.apart:
-            blocks += near.apart_rows(w, x, wanted, tube, lift)
+            blocks += near.apart_rows(w, x, wanted, level, tube, lift)
         return blocks
 
     def margins(self, x: Array) -> Margins:
@@ -81,7 +81,7 @@ class Steps:
         for w in self.within:
             found.append((float(near.inside_margin(w, x).min()), w.clause))
         for w in self.beyond:
-            found.append((float(near.outside_margin(w, x)[0].min()), w.clause))
+            found.append((near.outside_least(w, x, wanted), w.clause))
         least = min(least, *(m for m, _ in found)) - tube
         for w in self.apart:
             margin, asked = near.apart_margin(w, x)[0], near.pair_least(w, x, tube)
@@ -97,7 +97,7 @@ class Steps:
     def step(self, x: Array, hold: float | None, lift: Array | None = None) -> Array | None:
         """One convex step from `x`: maximise r, or hold it at `hold` and minimise energy."""
         size = self.setup.grid.size
-        below = self.rows(x, lift)
+        below = self.rows(x, self.setup.bound if hold is None else hold, lift)
         weight = SOFT if hold is None else 1.0
         smooth = energy(self.setup.grid, {k: weight * w for k, w in SMOOTH.items()})
         quadratic = sparse.csc_matrix(sparse.block_diag([smooth, sparse.csc_matrix((1, 1))]))
@@ -135,7 +135,7 @@ def climb(steps: Steps, x: Array, lift: Sequence[float]) -> tuple[Array, Margins
 
 
 def polish(steps: Steps, x: Array, reached: Margins) -> tuple[Array, Margins, int]:
-    """Minimise energy at r within `GIVEN_UP` of what was reached."""
+    """Minimise energy at r within `GIVEN_UP` of what was reached, pairs at least as far as the tube asks."""
     hold = reached.r - GIVEN_UP
     best, top = x, reached
     for count in range(1, POLISH + 3):
@@ -143,13 +143,13 @@ def polish(steps: Steps, x: Array, reached: Margins) -> tuple[Array, Margins, in
         if moved is None:
             return best, top, count
         now = steps.margins(moved)
-        if now.share <= 1 and now.r >= hold - TOLERANCE:
+        if now.share <= 1 and now.r >= hold - TOLERANCE and now.tube >= min(top.tube, 0.0):
             best, top = moved, now
             if count >= POLISH:
                 break
         # Something that was not posed was passed: pose it too, from the trajectory that passed it.
         else:
-            steps.rows(moved)
+            steps.rows(moved, hold)
     return best, top, count
 
 
