@@ -1,0 +1,102 @@
+"""Tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from fleet.cli.reply import Reply
+
+if TYPE_CHECKING:
+    from fleet.stl import Clause
+    from fleet.verdict import Verdict
+
+
+def formula(answer: Reply, clauses: Iterable[Clause]) -> None:
+    """The mission formula, a clause a line."""
+    answer.say("mission formula")
+    for clause in clauses:
+        answer.say(f"  @{clause.id}  {clause.text}")
+
+
+def plan(answer: Reply, plan: dict[str, Any], fields: dict[str, Any]) -> None:
+    """Who visits what when, robustness per clause, and where the time went."""
+    visits = _table("drone", "region", "t [s]", "window [s]", "slack [s]")
+    for event in fields["events"]:
+        low, high = event["window"]
+        visits.add_row(
+            event["drone"], event["region"], _f(event["t"]), f"{low:g} .. {high:g}", _f(event["slack_s"])
+        )
+    answer.out.print(visits)
+    answer.out.print(_clauses(fields["clauses"], ("rho", "rho_lower", "t_tightest")))
+    spent = ", ".join(
+        f"{name} {value:.2f} s" for name, value in fields["time_s"].items() if value is not None
+    )
+    answer.say(
+        f"{plan['scenario']}: {plan['status']} ({plan['method']}), rho {_f(plan['rho'])} m, "
+        f"continuous-time bound {_f(plan['rho_lower'])} m, upper bound {_f(plan['rho_bound'])} m"
+    )
+    answer.say(f"time: {spent}")
+    if fields["plan"]:
+        answer.say(f"plan: {fields['plan']}  sha256 {fields['hash'][:16]}...")
+
+
+def proof(answer: Reply) -> None:
+    """What `fleet verify` found in a plan."""
+    found = answer.fields
+    answer.out.print(_clauses(found["clauses"], ("rho", "rho_lower", "t_tightest")))
+    for problem in found["problems"]:
+        answer.say(f"problem: {problem}")
+    bound = _f(found["rho_lower"])
+    answer.say(f"{found['verdict']}: rho {_f(found['rho'])} m, continuous-time bound {bound} m")
+
+
+def word(verdict: Verdict) -> str:
+    """The verdict in one word."""
+    return "satisfied" if verdict.satisfied else "violated"
+
+
+def verdict(answer: Reply, verdict: Verdict) -> None:
+    """The judgement of a flight, per clause and per drone."""
+    found = verdict.as_dict()
+    answer.out.print(_clauses(found["clauses"], ("rho_planned", "rho_lower", "rho_flown", "t_tightest")))
+    columns = ("rmse_m", "max_m", "replans", "min_clearance_m", "gap_max_ms", "end")
+    drones = _table("drone", *columns)
+    for drone in found["drones"]:
+        drones.add_row(drone["id"], *(_f(drone[column]) for column in columns))
+    answer.out.print(drones)
+    for problem in verdict.problems:
+        answer.say(f"problem: {problem}")
+    answer.say(
+        f"{word(verdict)} (judged on {verdict.source}): rho flown {_f(verdict.rho_flown)} m, "
+        f"planned {_f(verdict.rho_planned)} m, least pair distance {_f(verdict.min_pair_m)} m"
+    )
+
+
+def _clauses(clauses: list[dict[str, Any]], columns: tuple[str, ...]) -> Table:
+    table = _table("clause", "kind", "drones", *columns)
+    for clause in clauses:
+        table.add_row(
+            f"@{clause['id']}",
+            clause["kind"],
+            " ".join(clause["drones"]),
+            *(_f(clause[column]) for column in columns),
+        )
+    return table
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(
+            column, justify="left" if column in {"drone", "region", "clause", "kind"} else "right"
+        )
+    return table
+
+
+def _f(value: object) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.3f}" if isinstance(value, float) else str(value)

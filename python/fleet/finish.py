@@ -1,0 +1,67 @@
+"""After a flight: one log from the parts, the verdict, the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fleet.files import PlanFile
+from fleet.rundir import RunDir
+
+if TYPE_CHECKING:
+    from fleet.verdict import Verdict
+
+
+@dataclass(frozen=True)
+class Finished:
+    """Merged log, report, and the judgement."""
+
+    log: Path
+    report: Path
+    verdict: Verdict
+
+
+def finish(
+    mission: PlanFile, parts: list[Path], t0_ns: int, run: RunDir, *, progress: Callable[[float, str], None]
+) -> Finished:
+    """Merge ``parts``, judge the flight and write the report; ``t0_ns`` is mission time 0 on the log's clock.
+
+    The log is merged first without a verdict, judged as anybody would judge it, and then completed with it.
+
+    Raises:
+        LogError: when a part is missing or cannot be read.
+    """
+    from fleet import report
+    from fleet.log import Mission, merge, read
+    from fleet.verdict import judge
+
+    about = Mission(mission.payload, t0_ns)
+    merge(parts, run.log, about, progress=lambda done: progress(0.5 * done, "merging logs"))
+    progress(0.5, "judging")
+    verdict = judge(read(run.log))
+    merge(
+        parts,
+        run.log,
+        about,
+        verdict=verdict.as_dict(),
+        progress=lambda done: progress(0.6 + 0.3 * done, "writing the verdict"),
+    )
+    progress(0.9, "writing the report")
+    report.write(read(run.log), verdict, run.report)
+    return Finished(run.log, run.report, verdict)
+
+
+def t0_of(log: Path) -> int:
+    """Mission time 0 [ns] that the virtual-time simulator wrote in its own log.
+
+    Raises:
+        LogError: when the log cannot be read.
+    """
+    import json
+
+    from fleet.log.flight import messages
+
+    missions = [json.loads(data) for _, _, data in messages(log, ["/mission"])]
+    return int(missions[-1]["t0_ns"])

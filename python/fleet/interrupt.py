@@ -1,0 +1,72 @@
+"""Ctrl-C (and SIGTERM, SIGHUP) in a command that owns processes and drones.
+
+While ``raising``, the first signal raises KeyboardInterrupt where the program stands. From then on, and
+whenever raising is off, signals are only counted, so that nothing can break into the cleaning up.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupt:
+    """Counts the signals of one command."""
+
+    def __init__(self) -> None:
+        """No signal yet; raising is on."""
+        self.count = 0
+        self.raising = True
+        self._pending = False
+        self._shields = 0
+
+    @property
+    def asked(self) -> bool:
+        """Whether any signal has come."""
+        return self.count > 0
+
+    @contextmanager
+    def installed(self) -> Iterator[None]:
+        """Handle the signals inside the block; a thread other than the main one cannot and leaves them."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = [signal.signal(one, self._on_signal) for one in _SIGNALS]
+        try:
+            yield
+        finally:
+            for one, handler in zip(_SIGNALS, before, strict=True):
+                signal.signal(one, handler)
+
+    @contextmanager
+    def shielded(self) -> Iterator[None]:
+        """Hold a KeyboardInterrupt back to the end of the block, which must be short."""
+        self._shields += 1
+        try:
+            yield
+        finally:
+            self._shields -= 1
+            if self._pending and not self._shields:
+                self._pending = False
+                self._raise()
+
+    def count_only(self) -> None:
+        """From here on signals are only counted."""
+        self.raising = False
+
+    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        self.count += 1
+        if self._shields:
+            self._pending = True
+        else:
+            self._raise()
+
+    def _raise(self) -> None:
+        if self.raising:
+            self.raising = False
+            raise KeyboardInterrupt
