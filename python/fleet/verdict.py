@@ -103,7 +103,7 @@ def judge(flight: Flight) -> Verdict:
 def mission_times(plan: _core.Plan) -> Array:
     """Sample times k T_s over [0, T] [s], shape (n,)."""
     count = round(plan["horizon"] / plan["sample"])
-    return np.arange(count + 1) * plan["sample"]
+    return np.arange(count + 1, dtype=np.float64) * float(plan["sample"])
 
 
 def positions_at(track: Array, times: Array) -> Array:

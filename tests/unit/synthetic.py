@@ -49,11 +49,8 @@ def _part(plan: Any, drone: Any, path: Path, shift: Shift, landed: bool) -> Path
 
         put(f"/{name}/mode", -1.0, {"mode": "takeoff", "cause": "start"})
         for t, row in zip(times.tolist(), rows, strict=True):
-            put(
-                f"/{name}/truth",
-                t,
-                {**_pose(row[:3] + shift(name, t)), "v": row[3:6].tolist(), "w": [0, 0, 0]},
-            )
+            v = row[3:6].tolist()
+            put(f"/{name}/truth", t, {**_pose(row[:3] + shift(name, t)), "v": v, "w": [0, 0, 0]})
             put(f"/{name}/reference", t, {**_pose(row[:3]), "v": v, "a": row[6:9].tolist()})
             deviation = float(np.linalg.norm(shift(name, t)))
             setpoint = {"rates": [0, 0, 0], "thrust": 0.4, "hover_thrust": 0.4, "deviation": deviation}
