@@ -340,6 +340,7 @@ class _Rejected(TypedDict):
         "clearance",
         "separation",
         "ends",
+        "certificate",
         "mode",
         "preflight",
         "start_time",

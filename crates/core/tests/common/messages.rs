@@ -76,7 +76,7 @@ fn all_codes() -> Vec<RejectCode> {
     ];
     codes.iter().for_each(|code| match code {
         Malformed | Expired | Stale | WrongMission | Hash | NotInPlan | WrongFleet | Limits => {}
-        Clearance | Separation | Ends | Mode | Preflight | StartTime | Peer | Autopilot => {}
+        Clearance | Separation | Ends | Certificate | Mode | Preflight | StartTime | Peer | Autopilot => {}
     });
     codes
 }
