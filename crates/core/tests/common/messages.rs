@@ -68,6 +68,7 @@ fn all_codes() -> Vec<RejectCode> {
         Clearance,
         Separation,
         Ends,
+        Certificate,
         Mode,
         Preflight,
         StartTime,
