@@ -6,6 +6,8 @@ scenarios and for drawing.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +22,7 @@ def largest_ball(A: Array, b: Array) -> tuple[Array, float]:
     """Centre (3,) and radius [m] of the largest ball inside; rows of A of unit length.
 
     Chebyshev centre by linear programming (Boyd and Vandenberghe 2004, section 8.5.1). Where many
-    balls are as large, the centre is the mean of the extreme ones along the axes.
+    balls are as large, the middle one along x, of those the middle one along y, and so for z.
 
     Raises:
         GeometryError: the polyhedron is empty, unbounded or flat.
@@ -32,7 +34,11 @@ def largest_ball(A: Array, b: Array) -> tuple[Array, float]:
         raise GeometryError("the polyhedron has no inside: it is flat or empty")
     # The set of centres is often a single point; the slack keeps it from being rounded away.
     inner = b - radius + 1e-9
-    center: Array = np.mean([_farthest(A, inner, direction) for direction in _AXES], axis=0)
+    center = np.zeros(3)
+    for axis in range(3):
+        known = [(x, x) for x in center[:axis]]
+        ends = [_farthest(A, inner, sign * np.eye(3)[axis], known)[axis] for sign in (-1.0, 1.0)]
+        center[axis] = (ends[0] + ends[1]) / 2
     return center, radius
 
 
@@ -49,11 +55,12 @@ def inradius(A: Array, b: Array) -> float:
 _AXES = np.vstack((np.eye(3), -np.eye(3)))
 
 
-def _farthest(A: Array, b: Array, direction: Array) -> Array:
-    """The point of the polyhedron farthest along `direction`."""
+def _farthest(A: Array, b: Array, direction: Array, known: Sequence[tuple[float, float]] = ()) -> Array:
+    """The point of the polyhedron farthest along `direction`, its first coordinates within `known`."""
     from scipy.optimize import linprog
 
-    found = linprog(-direction, A_ub=A, b_ub=b, bounds=(None, None), method="highs")
+    bounds = [*known, *[(None, None)] * (3 - len(known))]
+    found = linprog(-direction, A_ub=A, b_ub=b, bounds=bounds, method="highs")
     if found.status == 2:
         raise GeometryError("the polyhedron is empty: no point satisfies all of its faces")
     if found.status != 0 or found.x is None:
