@@ -1,4 +1,5 @@
-//! Simulated rate-controlled quadrotors that speak MAVLink as a PX4 does.
+//! Simulated rate-controlled quadrotors that speak MAVLink as a PX4 does, in real and in virtual
+//! time.
 #![forbid(unsafe_code)]
 
 pub mod autopilot;

@@ -1,1 +1,0 @@
-//! The autopilot's MAVLink behaviour.

@@ -1,1 +1,0 @@
-//! Rigid body quadrotor with motors, drag and a rate controller.
