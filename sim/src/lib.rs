@@ -3,5 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod autopilot;
+pub mod framing;
+pub mod log;
 pub mod plant;
 pub mod world;

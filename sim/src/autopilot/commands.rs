@@ -1,5 +1,7 @@
 //! Messages from clients and their answers (NED, FRD).
 
+#![allow(deprecated, reason = "stock clients still send SET_MODE, PING and the old capability request")]
+
 use super::commander::Answer;
 use super::frame;
 use super::mode::FlightMode;

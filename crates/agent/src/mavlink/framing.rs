@@ -15,15 +15,20 @@ const SIGNED: u8 = 0x01;
 
 /// One frame with a valid checksum; its payload is not parsed yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Frame<'a> {
+pub struct Frame<'a> {
+    /// Sender and sequence number.
     pub header: MavHeader,
+    /// Message id.
     pub id: u32,
+    /// MAVLink 1 or 2.
     pub version: MavlinkVersion,
-    payload: &'a [u8],
+    /// Payload as sent: in MAVLink 2 without its trailing zeros.
+    pub payload: &'a [u8],
 }
 
 impl Frame<'_> {
     /// The message, when the dialect knows it and every enumeration in it has a known value.
+    #[must_use]
     pub fn parse(&self) -> Option<MavMessage> {
         MavMessage::parse(self.version, self.id, self.payload).ok()
     }
@@ -31,7 +36,8 @@ impl Frame<'_> {
 
 /// All valid frames in `datagram`, in order. Bytes that belong to no valid frame are skipped one
 /// at a time, so that a frame after garbage is found.
-pub(super) fn frames(datagram: &[u8]) -> Vec<Frame<'_>> {
+#[must_use]
+pub fn frames(datagram: &[u8]) -> Vec<Frame<'_>> {
     let mut found = Vec::new();
     let mut rest = datagram;
     while !rest.is_empty() {

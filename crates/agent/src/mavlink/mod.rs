@@ -5,7 +5,7 @@
 mod decode;
 mod encode;
 pub mod frames;
-mod framing;
+pub mod framing;
 #[cfg(test)]
 mod tests;
 

@@ -135,6 +135,14 @@ pub struct EventMessage<'a> {
     event: &'a Event,
 }
 
+impl<'a> EventMessage<'a> {
+    /// An event of `drone`; the simulator reports crashes as such.
+    #[must_use]
+    pub fn new(at_ns: u64, drone: &'a str, event: &'a Event) -> Self {
+        Self { timestamp: at_ns.into(), drone, event }
+    }
+}
+
 /// `fleet.Mission`.
 #[derive(Clone, Debug, Serialize)]
 pub struct MissionMessage {
@@ -231,7 +239,7 @@ fn record_tick(
 }
 
 fn record_event(recorder: &mut Recorder, drone: &str, at_ns: u64, event: &Event) -> Result<(), RecordError> {
-    let message = EventMessage { timestamp: at_ns.into(), drone, event };
+    let message = EventMessage::new(at_ns, drone, event);
     recorder.json("/event", SchemaName::Event, at_ns, &message)?;
     if let EventKind::Mode { to, .. } = event.kind {
         let message = ModeMessage {

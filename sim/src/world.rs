@@ -1,1 +1,0 @@
-//! n plants, wind, force pulses, ground truth.
