@@ -3,7 +3,9 @@
 use crate::autopilot::{Autopilot, LinkId, Outgoing, OutgoingBody};
 use fleet_agent::mavlink::framing::{Frame, frames};
 use fleet_core::types::Nanos;
-use mavlink::dialects::common::{COMMAND_ACK_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, MavMessage, MavResult};
+use mavlink::dialects::common::{
+    COMMAND_ACK_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, MavMessage, MavResult,
+};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData, calculate_crc};
 
 /// Where the command number lies in the payload of COMMAND_LONG and COMMAND_INT alike.

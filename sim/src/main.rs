@@ -47,8 +47,9 @@ fn main() -> ExitCode {
         )
         .init();
     let outcome = match Cli::parse().command {
-        Command::Run { config, log, exit_when_landed } => read_config(&config)
-            .and_then(|world| realtime::run(&world, log.as_deref(), exit_when_landed)),
+        Command::Run { config, log, exit_when_landed } => {
+            read_config(&config).and_then(|world| realtime::run(&world, log.as_deref(), exit_when_landed))
+        }
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -162,8 +162,7 @@ impl Autopilot {
         let wanted = self.wanted();
         self.collective = wanted.thrust;
         let landed = self.commander.landed();
-        let torque =
-            self.rate_controller.update(&wanted.rates, &self.truth.w, self.saturated, landed, DT);
+        let torque = self.rate_controller.update(&wanted.rates, &self.truth.w, self.saturated, landed, DT);
         let mix = mixer::mix(wanted.thrust, torque);
         self.saturated = mix.saturated;
         self.estimate_hover(mix.motors.iter().sum::<f64>() / 4.0);
@@ -177,8 +176,7 @@ impl Autopilot {
             self.navigator.leave();
             return self.external.resolve(&self.truth);
         }
-        let command =
-            self.navigator.fly(mode, &self.truth, &self.origin, self.hover, &self.params, DT);
+        let command = self.navigator.fly(mode, &self.truth, &self.origin, self.hover, &self.params, DT);
         if command.takeoff_done {
             self.commander.takeoff_done();
         }

@@ -82,9 +82,7 @@ impl Streams {
     /// The default rates, first messages at once.
     #[must_use]
     pub fn new(now: Nanos) -> Self {
-        Self {
-            streams: DEFAULT_RATES.map(|(id, hz)| Stream { id, period: default_period(hz), next: now.0 }),
-        }
+        Self { streams: DEFAULT_RATES.map(|(id, hz)| Stream { id, period: default_period(hz), next: now.0 }) }
     }
 
     /// MAV_CMD_SET_MESSAGE_INTERVAL: `period_us` -1 stops, 0 gives the default.

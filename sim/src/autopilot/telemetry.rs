@@ -40,20 +40,18 @@ impl Snapshot<'_> {
         Some(match message_id {
             id::HEARTBEAT => self.heartbeat(),
             id::SYS_STATUS => self.sys_status(),
-            id::SYSTEM_TIME => MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA {
-                time_unix_usec: 0,
-                time_boot_ms: self.boot_ms(),
-            }),
+            id::SYSTEM_TIME => {
+                MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: self.boot_ms() })
+            }
             id::ATTITUDE => self.attitude(),
             id::ATTITUDE_QUATERNION => self.attitude_quaternion(),
             id::LOCAL_POSITION_NED => self.local_position(),
             id::GLOBAL_POSITION_INT => self.global_position(),
             id::GPS_GLOBAL_ORIGIN => self.global_origin(),
             id::ATTITUDE_TARGET => self.attitude_target(),
-            id::TIMESYNC => MavMessage::TIMESYNC(TIMESYNC_DATA {
-                ts1: self.boot.0 as i64,
-                ..TIMESYNC_DATA::DEFAULT
-            }),
+            id::TIMESYNC => {
+                MavMessage::TIMESYNC(TIMESYNC_DATA { ts1: self.boot.0 as i64, ..TIMESYNC_DATA::DEFAULT })
+            }
             id::HIL_STATE_QUATERNION => self.ground_truth(),
             id::BATTERY_STATUS => battery_status(),
             id::AUTOPILOT_VERSION => self.autopilot_version(),

@@ -52,9 +52,7 @@ pub fn mix(thrust: f64, torque: [f64; 3]) -> Mix {
     }
     let cut = scale < 1.0;
     Mix {
-        motors: std::array::from_fn(|i| {
-            (level + scale * tilt[i] + REACTION[i] * yaw).clamp(0.0, 1.0)
-        }),
+        motors: std::array::from_fn(|i| (level + scale * tilt[i] + REACTION[i] * yaw).clamp(0.0, 1.0)),
         saturated: [cut, cut, yaw != torque[2]],
     }
 }

@@ -150,7 +150,8 @@ impl WorldConfig {
             if !ids.contains(&p.drone) {
                 return refuse(format!("pulse[{i}].drone"), format!("{:?} is not a vehicle", p.drone));
             }
-            if !finite(&p.force) || !p.t.is_finite() || !(p.duration.is_finite() && p.duration > 0.0) {
+            let sound = p.t.is_finite() && p.duration.is_finite() && p.duration > 0.0;
+            if !(sound && finite(&p.force)) {
                 let problem = "t and force must be finite, duration positive";
                 return refuse(format!("pulse[{i}]"), problem.into());
             }

@@ -51,8 +51,7 @@ impl World {
             vehicles.push(Vehicle::new(v.id.clone(), plant, autopilot));
         }
         let index = |id: &str| config.vehicles.iter().position(|v| v.id == id);
-        let pulses =
-            config.pulses.iter().filter_map(|p| index(&p.drone).map(|i| (i, p.clone()))).collect();
+        let pulses = config.pulses.iter().filter_map(|p| index(&p.drone).map(|i| (i, p.clone()))).collect();
         Ok(Self {
             now: Nanos(0),
             t0: None,
