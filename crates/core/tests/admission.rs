@@ -36,9 +36,11 @@ fn admits_what_is_sound() {
     }
 }
 
+type Change = fn(&mut Plan);
+
 #[test]
 fn malformed() {
-    let changes: [(&str, fn(&mut Plan)); 10] = [
+    let changes: [(&str, Change); 10] = [
         ("schema", |p| p.schema = 2),
         ("stands twice", |p| p.drones[1].id = "d1".into()),
         ("drones", |p| p.drones.clear()),
@@ -71,7 +73,7 @@ fn not_in_plan() {
 #[test]
 fn limits_above_the_vehicle() {
     for change in [
-        (|p: &mut Plan| p.limits.v_max = 5.1) as fn(&mut Plan),
+        (|p: &mut Plan| p.limits.v_max = 5.1) as Change,
         |p| p.limits.a_max = 4.1,
         |p| p.limits.psi_rate_max = 0.9,
         |p| p.limits.a_max = 0.0,
@@ -85,7 +87,7 @@ fn limits_above_the_vehicle() {
 fn trajectory_above_the_limits() {
     // Velocity and acceleration peak between knots: only a continuous bound sees them.
     for change in [
-        (|p: &mut Plan| p.limits.v_max = 2.0) as fn(&mut Plan),
+        (|p: &mut Plan| p.limits.v_max = 2.0) as Change,
         |p| p.limits.a_max = 1.0,
         |p| p.limits.psi_rate_max = 0.1,
     ] {
@@ -117,7 +119,7 @@ fn comes_too_close() {
 
 #[test]
 fn ends_in_motion_or_elsewhere() {
-    let changes: [fn(&mut Plan); 6] = [
+    let changes: [Change; 6] = [
         |p| with_knots(p, 0, |k| k[0].v.z = 0.1),
         |p| with_knots(p, 1, |k| k.last_mut().unwrap().a.x = 0.1),
         |p| with_knots(p, 0, |k| k.last_mut().unwrap().psi_rate = 0.1),
@@ -133,7 +135,7 @@ fn ends_in_motion_or_elsewhere() {
 
 #[test]
 fn certificate_missing_or_negative() {
-    let changes: [fn(&mut Plan); 5] = [
+    let changes: [Change; 5] = [
         |p| p.status = PlanStatus::Violated,
         |p| p.clauses.clear(),
         |p| p.clauses[0].result.rho_lower = 0.0,
@@ -149,7 +151,7 @@ fn certificate_missing_or_negative() {
 #[test]
 fn a_number_that_is_not_one_is_refused() {
     for change in [
-        (|p: &mut Plan| p.limits.v_max = f64::NAN) as fn(&mut Plan),
+        (|p: &mut Plan| p.limits.v_max = f64::NAN) as Change,
         |p| p.horizon = f64::NAN,
         |p| p.limits.delta_min = f64::NAN,
         |p| p.rho_lower = f64::NAN,

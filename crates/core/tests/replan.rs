@@ -6,9 +6,11 @@ mod fixture;
 #[path = "fixture/instance.rs"]
 mod instance;
 
-use fleet_core::replan::{Replanner, Request, Solution};
+use fleet_core::replan::{ReplanError, Replanner, Request, Solution};
 use fleet_core::trajectory::Trajectory;
+use fleet_core::types::Vec3;
 use fleet_core::wire::{Plan, ReplanOutcome, encode};
+use instance::{GUST, Push, STORM};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
@@ -20,14 +22,14 @@ struct Case {
     solution: Solution,
 }
 
-fn cases(seed: u64, n: u64) -> Vec<Case> {
+fn cases(seed: u64, push: Push, n: u64) -> Vec<Case> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let plans = instance::plans();
     let mut replanners = BTreeMap::new();
     (0..n)
         .map(|id| {
             let plan = &plans[id as usize % plans.len()];
-            let (drone, request) = instance::draw(&mut rng, plan, id);
+            let (drone, request) = instance::draw(&mut rng, plan, push, id);
             let key = (plan.scenario.clone(), drone.clone());
             let replanner = replanners.entry(key).or_insert_with(|| Replanner::new(plan, &drone).unwrap());
             let solution = replanner.solve(&request);
@@ -46,7 +48,7 @@ fn times(trajectory: &Trajectory) -> impl Iterator<Item = f64> + '_ {
 
 #[test]
 fn most_random_replans_are_committed() {
-    let all = cases(7, 200);
+    let all = cases(7, GUST, 200);
     let solved = all.iter().filter(|c| c.solution.outcome == ReplanOutcome::Committed).count();
     for c in all.iter().filter(|c| c.solution.outcome != ReplanOutcome::Committed) {
         println!("{} {} {:?} {}", c.plan.scenario, c.drone, c.request.start, c.solution.reason);
@@ -56,7 +58,7 @@ fn most_random_replans_are_committed() {
 
 #[test]
 fn committed_replans_keep_limits_and_clearance_at_dense_samples() {
-    for case in cases(11, 60) {
+    for case in cases(11, GUST, 60) {
         let Some(new) = &case.solution.trajectory else { continue };
         let (plan, start) = (&case.plan, &case.request.start);
         let workspace = plan.region(&plan.workspace).unwrap();
@@ -86,7 +88,7 @@ fn committed_replans_keep_limits_and_clearance_at_dense_samples() {
 
 #[test]
 fn replans_join_state_and_plan_without_a_jump() {
-    for case in cases(13, 60) {
+    for case in cases(13, STORM, 60) {
         let Some(new) = &case.solution.trajectory else { continue };
         let (start, end) = (&case.request.start, case.solution.t_rejoin.unwrap());
         let first = new.knots()[0];
@@ -105,18 +107,105 @@ fn replans_join_state_and_plan_without_a_jump() {
 
 #[test]
 fn the_same_request_gives_the_same_bytes() {
-    for (a, b) in cases(17, 30).into_iter().zip(cases(17, 30)) {
+    for (a, b) in cases(17, STORM, 30).into_iter().zip(cases(17, STORM, 30)) {
         assert_eq!(encode(&a.solution).unwrap(), encode(&b.solution).unwrap());
     }
 }
 
 #[test]
 fn only_committed_replans_carry_a_trajectory() {
-    for case in cases(19, 100) {
+    for case in cases(19, STORM, 100) {
         let committed = case.solution.outcome == ReplanOutcome::Committed;
         assert_eq!(case.solution.trajectory.is_some(), committed);
         assert_eq!(case.solution.t_rejoin.is_some(), committed);
         let first = case.solution.t_rejoin == case.request.rejoin.first().copied();
         assert_eq!(case.solution.reason.is_empty(), committed && first);
     }
+}
+
+#[test]
+fn storms_never_lead_into_an_obstacle() {
+    for case in cases(23, STORM, 200) {
+        let Some(new) = &case.solution.trajectory else { continue };
+        for t in times(new) {
+            let r = new.sample(t);
+            for name in &case.plan.obstacles {
+                assert!(case.plan.region(name).unwrap().outside(&r.p) > 0.0, "{name} at {t}");
+            }
+        }
+    }
+}
+
+#[test]
+fn simultaneous_replans_of_both_drones_stay_apart() {
+    // The fleet plan's own least distance is 5.04 m: delta_min plus two tubes, with nothing to spare.
+    let mut plan = fixture::crossing();
+    plan.limits.delta_min = 4.2;
+    let mut replanners = ["d1", "d2"].map(|id| Replanner::new(&plan, id).unwrap());
+    let mut rng = ChaCha8Rng::seed_from_u64(29);
+    let mut compared = 0;
+    for id in 0..400 {
+        let (first, second) =
+            (instance::draw(&mut rng, &plan, GUST, id), instance::draw(&mut rng, &plan, GUST, id));
+        let both = [first, second].map(|(drone, request)| {
+            let own = usize::from(drone == "d2");
+            (own, request.start.t, replanners[own].solve(&request).trajectory)
+        });
+        let [(0, start_a, Some(a)), (1, start_b, Some(b))] = both else { continue };
+        // From 1.5 s after the later splice on, what the starts were short of is made up for.
+        let from = start_a.max(start_b) + 1.5;
+        for t in times(&a).filter(|t| *t >= from && *t <= b.end()) {
+            let distance = (a.position(t) - b.position(t)).norm();
+            assert!(distance >= 4.2 - 1e-6, "{distance} m at {t}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 2000, "only {compared} moments compared");
+}
+
+#[test]
+fn hopeless_requests_are_answered_with_reasons() {
+    let plan = fixture::tower();
+    let mut replanner = Replanner::new(&plan, "d1").unwrap();
+    let (p, v, a) = plan.drones[0].trajectory.motion(10.0);
+    let start = fleet_core::trajectory::Knot { t: 10.0, p, v, a, psi: 0.0, psi_rate: 0.0, psi_acc: 0.0 };
+    let good =
+        Request { id: 5, hash: "h".into(), t_event: 9.9, deviation: 0.5, start, rejoin: vec![15.0, 20.0] };
+    assert_eq!(replanner.solve(&good).outcome, ReplanOutcome::Committed);
+
+    let mut broken = good.clone();
+    broken.start.v.x = f64::NAN;
+    let mut inside = good.clone();
+    inside.start.p = Vec3::new(0.0, 0.0, 10.0);
+    let mut far = good.clone();
+    far.start.p += Vec3::new(0.0, 0.0, 4.0);
+    far.rejoin = vec![10.8];
+    let mut past = good.clone();
+    past.rejoin = vec![5.0, 10.1, 40.0];
+    let mut none = good.clone();
+    none.rejoin.clear();
+    for (request, outcome, tries) in [
+        (&broken, ReplanOutcome::Refused, 1),
+        (&inside, ReplanOutcome::Refused, 2),
+        (&far, ReplanOutcome::Infeasible, 1),
+        (&past, ReplanOutcome::Infeasible, 3),
+        (&none, ReplanOutcome::Infeasible, 1),
+    ] {
+        let s = replanner.solve(request);
+        assert_eq!((s.outcome, s.id, s.hash.as_str()), (outcome, 5, "h"), "{}", s.reason);
+        assert!(s.trajectory.is_none() && s.t_rejoin.is_none());
+        assert_eq!(s.reason.split("; ").count(), tries, "{}", s.reason);
+    }
+    // A hopeless first waypoint does not hide a good second one.
+    far.rejoin.push(20.0);
+    let s = replanner.solve(&far);
+    assert_eq!((s.outcome, s.t_rejoin), (ReplanOutcome::Committed, Some(20.0)), "{}", s.reason);
+}
+
+#[test]
+fn a_replanner_needs_its_drone_and_regions() {
+    let mut plan = fixture::tower();
+    assert_eq!(Replanner::new(&plan, "d9").unwrap_err(), ReplanError::UnknownDrone("d9".into()));
+    plan.obstacles.push("tower2".into());
+    assert_eq!(Replanner::new(&plan, "d1").unwrap_err(), ReplanError::UnknownRegion("tower2".into()));
 }

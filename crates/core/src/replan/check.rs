@@ -66,7 +66,7 @@ pub enum CheckError {
 pub fn check(trajectory: &Trajectory, start: &Knot, scene: &Scene<'_>, own: usize) -> Result<(), CheckError> {
     joins(trajectory, start, &scene.trajectories[own])?;
     limits(trajectory, scene)?;
-    workspace(trajectory, scene)?;
+    workspace(trajectory, scene, own)?;
     for segment in 0..trajectory.segments() {
         let q = trajectory.quintic(segment);
         for (index, obstacle) in scene.obstacles.iter().enumerate() {
@@ -75,7 +75,7 @@ pub fn check(trajectory: &Trajectory, start: &Knot, scene: &Scene<'_>, own: usiz
             }
         }
     }
-    (0..scene.trajectories.len()).filter(|i| *i != own).try_for_each(|i| peer(trajectory, scene, i))
+    (0..scene.trajectories.len()).filter(|i| *i != own).try_for_each(|i| peer(trajectory, scene, own, i))
 }
 
 fn joins(trajectory: &Trajectory, start: &Knot, plan: &Trajectory) -> Result<(), CheckError> {
@@ -129,54 +129,71 @@ fn excess<const N: usize>(coefficients: &[f64; N], bound: impl Fn(f64) -> f64) -
     -room(1.0).min(room(-1.0))
 }
 
-/// Inside every face, or, where the start is beyond a face or cannot stop before it, no farther out
-/// than half of the acceleration limit makes unavoidable, and back inside in the time that takes.
-fn workspace(trajectory: &Trajectory, scene: &Scene<'_>) -> Result<(), CheckError> {
-    let a = 0.5 * scene.limits.a_max;
-    let start = &trajectory.knots()[0];
-    let mut depth = 0.0_f64;
-    let mut time = 0.0_f64;
-    for face in scene.workspace.faces() {
-        let (d, u) = (face.a.dot(&start.p) - face.b, face.a.dot(&start.v));
-        depth = depth.max(recovery_depth(d, u, a));
-        time = time.max(recovery_time(d, u, a));
-    }
-    let until = back_by(trajectory, time);
-    for (i, k) in trajectory.knots().iter().take(trajectory.segments()).enumerate() {
-        let allowed = if k.t < until - 1e-9 { depth } else { 0.0 };
-        let by = -min_inside(&trajectory.quintic(i), scene.workspace, -allowed);
-        if by > allowed + ROUNDING {
-            return Err(CheckError::Workspace { by, t: k.t });
+/// Inside the workspace, up to what the start's deviation makes unavoidable.
+fn workspace(trajectory: &Trajectory, scene: &Scene<'_>, own: usize) -> Result<(), CheckError> {
+    let plan = &scene.trajectories[own];
+    let unavoidable = Unavoidable::new(trajectory, plan, scene);
+    for (i, w) in trajectory.knots().windows(2).enumerate() {
+        let reach = unavoidable.at(w[0].t);
+        let least = if reach > 0.0 {
+            let pieces = plan.breaks(w[0].t, w[1].t);
+            let inside = |w: &[f64]| min_inside(&plan.piece(w[0], w[1]), scene.workspace, reach);
+            (pieces.windows(2).map(inside).fold(f64::INFINITY, f64::min) - reach).min(0.0)
+        } else {
+            0.0
+        };
+        let margin = min_inside(&trajectory.quintic(i), scene.workspace, least);
+        if margin < least - ROUNDING {
+            return Err(CheckError::Workspace { by: -margin, t: w[0].t });
         }
     }
     Ok(())
 }
 
-/// `delta_min` from the peer's fleet plan, or, while the start makes that impossible, no closer than
-/// half of the acceleration limit makes unavoidable.
-fn peer(trajectory: &Trajectory, scene: &Scene<'_>, index: usize) -> Result<(), CheckError> {
-    let other = &scene.trajectories[index];
-    let a = 0.5 * scene.limits.a_max;
-    let start = &trajectory.knots()[0];
-    let (p, v, _) = other.motion(start.t);
-    let apart = start.p - p;
-    let distance = apart.norm();
-    let closing = if distance > 1e-6 { -apart.dot(&(start.v - v)) / distance } else { 0.0 };
-    let short = scene.limits.delta_min - distance;
-    let allowed = recovery_depth(short, closing, a).max(0.0);
-    let until = back_by(trajectory, recovery_time(short, closing, a));
-    for k in trajectory.knots().windows(2) {
-        let least = scene.limits.delta_min - if k[0].t < until - 1e-9 { allowed } else { 0.0 };
-        let distance = trajectory.min_distance(other, k[0].t, k[1].t, least);
+/// `delta_min` from a peer's fleet plan, up to what the start's deviation makes unavoidable.
+fn peer(trajectory: &Trajectory, scene: &Scene<'_>, own: usize, index: usize) -> Result<(), CheckError> {
+    let (plan, other) = (&scene.trajectories[own], &scene.trajectories[index]);
+    let unavoidable = Unavoidable::new(trajectory, plan, scene);
+    for w in trajectory.knots().windows(2) {
+        let (from, to) = (w[0].t, w[1].t);
+        let reach = unavoidable.at(from);
+        let delta_min = scene.limits.delta_min;
+        let least = if reach > 0.0 {
+            (plan.min_distance(other, from, to, delta_min + reach) - reach).clamp(0.0, delta_min)
+        } else {
+            delta_min
+        };
+        let distance = trajectory.min_distance(other, from, to, least);
         if distance < least - ROUNDING {
-            return Err(CheckError::Peer { index, distance, t: k[0].t });
+            return Err(CheckError::Peer { index, distance, t: from });
         }
     }
     Ok(())
 }
 
-/// The knot by which the bounds must hold again, `time` after the start.
-fn back_by(trajectory: &Trajectory, time: f64) -> f64 {
-    let times: Vec<f64> = trajectory.knots().iter().map(|k| k.t).collect();
-    knot_after(&times, times[0] + time)
+/// How far from the plan the drone must be expected while half of the acceleration limit brings the
+/// start's deviation back. Bounds towards workspace and peers may give way by what of it the plan's
+/// own margin does not cover, and only for that time; obstacles never do.
+struct Unavoidable {
+    reach: f64,
+    until: f64,
+}
+
+impl Unavoidable {
+    fn new(trajectory: &Trajectory, plan: &Trajectory, scene: &Scene<'_>) -> Self {
+        let start = &trajectory.knots()[0];
+        let (p, v, _) = plan.motion(start.t);
+        let (off, drift) = (start.p - p, start.v - v);
+        let distance = off.norm();
+        let outward = if distance > 1e-9 { off.dot(&drift) / distance } else { drift.norm() };
+        let a = 0.5 * scene.limits.a_max;
+        let times: Vec<f64> = trajectory.knots().iter().map(|k| k.t).collect();
+        let until = knot_after(&times, start.t + recovery_time(distance, outward, a));
+        Self { reach: recovery_depth(distance, outward, a), until }
+    }
+
+    /// For a segment that begins at mission time `t` [m].
+    fn at(&self, t: f64) -> f64 {
+        if t < self.until - 1e-9 { self.reach } else { 0.0 }
+    }
 }

@@ -33,6 +33,8 @@ pub struct Side {
     pub rate: f64,
     /// Start of the slot [s].
     pub from: f64,
+    /// How far the fleet plan stays beyond the plane over the slot [m].
+    pub spare: f64,
 }
 
 impl Side {
@@ -119,7 +121,14 @@ fn slot_sides(scene: &Scene<'_>, own: usize, from: f64, to: f64) -> Vec<Side> {
 fn keep_beyond(hull: &Hull, plane: &HalfSpace, from: f64, tube: f64, source: Source) -> Option<Side> {
     let margin = hull.least(|_, p| plane.a.dot(p) - plane.b);
     let kept = if margin > 0.0 { tube.min(0.5 * margin) } else { margin };
-    (margin < FAR).then_some(Side { source, normal: plane.a, at: plane.b + kept, rate: 0.0, from })
+    (margin < FAR).then_some(Side {
+        source,
+        normal: plane.a,
+        at: plane.b + kept,
+        rate: 0.0,
+        from,
+        spare: margin - kept,
+    })
 }
 
 /// The plane with the polyhedron behind it that the plan's control points are farthest beyond:
@@ -162,6 +171,7 @@ struct Bisector {
     centre: f64,
     rate: f64,
     half: f64,
+    spare: f64,
 }
 
 impl Bisector {
@@ -173,6 +183,7 @@ impl Bisector {
             at: self.centre * sign + self.half,
             rate: self.rate * sign,
             from,
+            spare: self.spare,
         }
     }
 }
@@ -205,7 +216,8 @@ fn bisector(a: &Trajectory, b: &Trajectory, from: f64, to: f64, limits: &Limits)
         let gap = low - high;
         if best.as_ref().is_none_or(|(g, _)| gap > *g) {
             let half = 0.5 * gap.min(limits.delta_min);
-            best = Some((gap, Bisector { normal, centre: start + 0.5 * (low + high), rate, half }));
+            let centre = start + 0.5 * (low + high);
+            best = Some((gap, Bisector { normal, centre, rate, half, spare: 0.5 * gap - half }));
         }
     }
     best.map(|(_, plane)| plane)

@@ -24,8 +24,8 @@ pub const DEVIATION_WEIGHT: f64 = 0.5;
 const SLACK_PRICE: f64 = 1e4;
 /// Interior-point steps; solved instances need 6 to 20, and the rest must not hold up the drone.
 const MAX_ITERATIONS: u32 = 50;
-/// Solves with added rows before every row is posed.
-const PARTIAL_ROUNDS: usize = 4;
+/// Solves with more and more rows before every row is posed.
+const PARTIAL_ROUNDS: u32 = 6;
 /// Violation at which a row that was not posed is added; below the margin of the rows.
 const VIOLATED: f64 = 5e-7;
 
@@ -48,14 +48,14 @@ pub fn solve(states: &States, bases: &[Basis], rows: &Rows) -> Result<Vec<f64>, 
     let cost = Cost::new(states, bases);
     let mut x = cost.free_minimum().ok_or(QpError::Setup)?;
     let mut posed = vec![false; rows.len()];
-    for round in 0.. {
-        let everything = round > PARTIAL_ROUNDS;
+    for round in 0_u32.. {
+        let everything = round == PARTIAL_ROUNDS;
         let violated = (0..rows.len()).any(|i| !posed[i] && rows.excess(i, &x) > VIOLATED);
         if !violated {
             break;
         }
         for (i, posed) in posed.iter_mut().enumerate() {
-            *posed |= everything || rows.is_near(i, &x);
+            *posed |= everything || rows.is_near(i, &x, f64::from(1 + 2 * round));
         }
         x = constrained(&cost, rows, &posed)?;
         if everything {

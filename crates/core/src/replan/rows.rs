@@ -5,7 +5,7 @@ use super::corridor::{Side, Source};
 use super::grid::slots;
 use super::start::{Allowance, recovery_time};
 use super::states::States;
-use crate::types::{Limits, Vec3};
+use crate::types::Limits;
 
 /// Margin by which rows are tighter than the bounds, above the solver's feasibility tolerance.
 const TIGHTER: f64 = 1e-6;
@@ -24,6 +24,7 @@ pub struct Rows {
     upper: Vec<f64>,
     near: Vec<f64>,
     slack: Vec<Option<usize>>,
+    segment: Vec<usize>,
     softened: Vec<(Source, usize)>,
 }
 
@@ -60,14 +61,17 @@ impl Rows {
         self.row(i).map(|(c, v)| v * x[c]).sum::<f64>() - self.upper[i]
     }
 
-    /// Whether `x` is near enough to row `i` for it to matter.
-    pub fn is_near(&self, i: usize, x: &[f64]) -> bool {
-        self.excess(i, x) > -self.near[i]
+    /// Whether `x` is near enough to row `i` for it to matter; `scale` widens what is near. All rows
+    /// matter up to the last soft segment, where the price of slack drives the solution to bounds.
+    pub fn is_near(&self, i: usize, x: &[f64], scale: f64) -> bool {
+        let pressed = self.softened.iter().any(|(_, soft)| self.segment[i] <= *soft);
+        pressed || self.excess(i, x) > -scale * self.near[i]
     }
 
     /// Appends a row; one without a variable is left to the check after the solve.
     fn push(
         &mut self,
+        segment: usize,
         entries: impl Iterator<Item = (usize, f64)>,
         upper: f64,
         near: f64,
@@ -85,6 +89,7 @@ impl Rows {
             self.upper.push(upper - TIGHTER);
             self.near.push(near);
             self.slack.push(slack);
+            self.segment.push(segment);
         }
     }
 
@@ -127,7 +132,7 @@ impl Rows {
         let base = states.base_value(segment, axis, row);
         for sign in [1.0, -1.0] {
             let entries = states.columns(segment, axis).zip(row).filter_map(|(c, v)| Some((c?, sign * v)));
-            self.push(entries, bound - sign * base, NEAR_LIMIT * bound, None);
+            self.push(segment, entries, bound - sign * base, NEAR_LIMIT * bound, None);
         }
     }
 
@@ -142,24 +147,25 @@ impl Rows {
                 let n = side.normal[d];
                 states.columns(segment, d).zip(row).filter_map(move |(c, v)| Some((c?, -n * v)))
             });
-            self.push(entries, base - offset, NEAR_SIDE, slack);
+            self.push(segment, entries, base - offset, NEAR_SIDE, slack);
         }
     }
 }
 
-/// Whether the start makes it impossible to keep `side` in this segment: beyond it, or so fast
-/// towards it that half of the acceleration limit does not stop or return the drone before.
+/// Whether the start makes it impossible to keep `side` in this segment: control points that it
+/// fixes are beyond, or the deviation from the plan takes longer than until this segment to come back
+/// to what the plan can spare there.
 fn is_soft(states: &States, segment: usize, basis: &Basis, side: &Side, limits: &Limits) -> bool {
-    let start = &states.start;
-    let t = states.times[0];
-    let fixed = |p: &Vec3, t: f64| side.offset(t) - side.normal.dot(p);
-    let mut depth = fixed(&start.p, t);
+    let (start, h, t) = (&states.start, basis.h, states.times[0]);
     if segment == 0 {
-        let h = basis.h;
         let first = start.p + start.v * (h / 5.0);
         let second = start.p + start.v * (0.4 * h) + start.a * (h * h / 20.0);
-        depth = depth.max(fixed(&first, t + h / 5.0)).max(fixed(&second, t + 0.4 * h));
+        let fixed = [(0.0, start.p), (0.2, first), (0.4, second)];
+        if fixed.iter().any(|(s, p)| side.normal.dot(p) < side.offset(t + s * h)) {
+            return true;
+        }
     }
-    let outward = side.rate - side.normal.dot(&start.v);
+    let (off, drift) = states.off;
+    let (depth, outward) = (-side.normal.dot(&off) - side.spare, -side.normal.dot(&drift));
     t + recovery_time(depth, outward, 0.5 * limits.a_max) > states.times[segment] + 1e-9
 }

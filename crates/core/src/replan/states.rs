@@ -10,6 +10,8 @@ use crate::types::Vec3;
 pub struct States {
     /// The start as requested.
     pub start: Knot,
+    /// Position and velocity of the start, less those of the plan at its time [m, m/s].
+    pub off: (Vec3, Vec3),
     /// Knot times [s].
     pub times: Vec<f64>,
     /// Per knot and axis `(p, v TAU, a TAU^2)`.
@@ -19,6 +21,8 @@ pub struct States {
 impl States {
     /// States from `start` to the plan at the last of `times`.
     pub fn new(start: &Knot, plan: &Trajectory, times: Vec<f64>) -> Self {
+        let (p, v, _) = plan.motion(start.t);
+        let off = (start.p - p, start.v - v);
         let scaled = |p: &Vec3, v: &Vec3, a: &Vec3| {
             std::array::from_fn(|d| [p[d] * UNIT[0], v[d] * UNIT[1], a[d] * UNIT[2]])
         };
@@ -30,7 +34,7 @@ impl States {
                 scaled(&p, &v, &a)
             })
             .collect();
-        Self { start: *start, times, base }
+        Self { start: *start, off, times, base }
     }
 
     /// Number of segments.
