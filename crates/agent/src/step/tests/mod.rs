@@ -1,0 +1,4 @@
+//! Flights of the agent in virtual time, against a vehicle small enough to be obvious.
+
+mod flight;
+mod rig;
