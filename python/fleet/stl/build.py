@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import combinations
+from itertools import permutations
 
 from lark import Token
 
 from fleet.stl.arithmetic import Arithmetic, Node, Scope, as_token, as_tree
 from fleet.stl.linear import LinearForm
-from fleet.stl.vocabulary import RESERVED, Formula, is_name
+from fleet.stl.vocabulary import RESERVED, Formula, Vocabulary, is_name
+
+MAX_INSTANCES = 100_000
+"""Bodies of quantifiers that one text may expand to; 64 drones have 2016 pairs."""
 
 
 class Builder(Arithmetic):
     """Builds formulas from parse trees of one text; None stands for "true whatever the drones do"."""
+
+    def __init__(self, vocabulary: Vocabulary, text: str) -> None:
+        super().__init__(vocabulary, text)
+        self._instances = 0
 
     def formula(self, node: Node, scope: Scope | None = None, offset: float = 0.0) -> Formula | None:
         """The formula of `node`, evaluated `offset` seconds or less after mission time 0.
@@ -90,15 +97,15 @@ class Builder(Arithmetic):
     # -- quantifiers ---------------------------------------------------------------------------
 
     def _all(self, node: Node, scope: Scope, offset: float) -> Formula | None:
-        return _conjunction(self._instances(node, scope, offset))
+        return _conjunction(self._bodies(node, scope, offset))
 
     def _some(self, node: Node, scope: Scope, offset: float) -> Formula:
-        instances = self._instances(node, scope, offset)
+        instances = self._bodies(node, scope, offset)
         if not instances:
             raise self.error(node, "there are not enough drones for this")
         return instances[0] if len(instances) == 1 else {"op": "or", "fs": instances}
 
-    def _instances(self, node: Node, scope: Scope, offset: float) -> list[Formula]:
+    def _bodies(self, node: Node, scope: Scope, offset: float) -> list[Formula]:
         """The body for each drone, or for each pair; both orders only where they differ."""
         *variables, body = node.children
         names = [self._variable(as_token(variable), scope) for variable in variables]
@@ -106,15 +113,18 @@ class Builder(Arithmetic):
             raise self.error(
                 as_token(variables[1]), f"'{names[1]}' is used twice; the two drones need two names"
             )
-        found: list[Formula] = []
-        for drones in combinations(self.words.drones, len(names)):
-            for order in (drones, drones[::-1]):
-                instance = self.formula(
-                    as_tree(body), {**scope, **dict(zip(names, order, strict=True))}, offset
+        found: dict[str, Formula] = {}
+        for drones in permutations(self.words.drones, len(names)):
+            self._instances += 1
+            if self._instances > MAX_INSTANCES:
+                raise self.error(
+                    node, f"the quantifiers of this text expand to over {MAX_INSTANCES} formulas"
                 )
-                if instance is not None and instance not in found:
-                    found.append(instance)
-        return found
+            inner = {**scope, **dict(zip(names, drones, strict=True))}
+            instance = self.formula(as_tree(body), inner, offset)
+            if instance is not None:
+                found.setdefault(repr(instance), instance)
+        return list(found.values())
 
     def _variable(self, token: Token, scope: Scope) -> str:
         words = self.words

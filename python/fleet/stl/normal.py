@@ -8,11 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 from fleet.stl.vocabulary import Clause, Formula
-
-Kind = Literal["invariant", "event", "rest"]
 
 
 @dataclass(frozen=True)
@@ -66,16 +63,6 @@ class NormalForm:
     invariants: tuple[Invariant, ...]
     rest: tuple[Rest, ...]
 
-    def kind(self, clause: str) -> Kind:
-        """What the parts of the clause with this id are, `rest` when they are not all alike."""
-        owners: dict[Kind, set[str]] = {
-            "event": {event.clause for event in self.events} | {gather.clause for gather in self.gathers},
-            "invariant": {invariant.clause for invariant in self.invariants},
-            "rest": {part.clause for part in self.rest},
-        }
-        kinds = [kind for kind, clauses in owners.items() if clause in clauses]
-        return kinds[0] if len(kinds) == 1 else "rest"
-
 
 def normal_form(clauses: Iterable[Clause], T: float) -> NormalForm:
     """Takes the clauses apart, for a mission of T seconds."""
@@ -102,11 +89,11 @@ def _mentions(formula: Formula) -> Iterator[str]:
     elif op == "linear":
         yield from (term["drone"] for term in formula["terms"])
     else:
-        for child in children(formula):
+        for child in _children(formula):
             yield from _mentions(child)
 
 
-def children(formula: Formula) -> list[Formula]:
+def _children(formula: Formula) -> list[Formula]:
     """The operands of a formula, left to right; none for a predicate."""
     if "fs" in formula:
         return list(formula["fs"])
