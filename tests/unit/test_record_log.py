@@ -64,7 +64,7 @@ def test_reference_setpoint_and_event(messages: dict[str, list[tuple[Any, Any, A
     mode = json.loads(messages["/d1/mode"][0][2].data)
     assert (mode["mode"], mode["cause"]) == ("track", "mission time 0 reached")
     event = json.loads(messages["/event"][0][2].data)
-    assert (event["drone"], event["event"]["kind"]["event"]) == ("d1", "mode")
+    assert (event["drone"], event["event"]["what"]["event"]) == ("d1", "mode")
     replan = json.loads(messages["/d1/replan"][0][2].data)
     assert replan["notice"]["outcome"] == "infeasible"
 

@@ -5,6 +5,7 @@ pub mod config;
 pub mod io;
 pub mod mavlink;
 pub mod record;
+pub mod runtime;
 mod step;
 
 pub use fleet_core::replan::{Request as SolveRequest, Solution as SolveResult};

@@ -2,8 +2,8 @@
 //!
 //! `FLEET_WRITE_GOLDEN=1 cargo nextest run -p fleet-agent golden` writes them anew after a wanted
 //! change of format.
-// Tests read and write files.
-#![allow(clippy::disallowed_methods)]
+// A test reads and writes files, and an unwrap in it is its failure.
+#![allow(clippy::disallowed_methods, clippy::unwrap_used)]
 
 use fleet_agent::io::{Output, Stream, Tick, VehicleCmd, VehicleMode};
 use fleet_agent::mavlink::Codec;

@@ -57,7 +57,7 @@ fn attitude_quaternion(data: &ATTITUDE_QUATERNION_DATA) -> Option<VehicleMsg> {
     let [w, i, j, k] = [data.q1, data.q2, data.q3, data.q4].map(f64::from);
     let q = Quaternion::new(w, i, j, k);
     // Single precision and a coarse autopilot leave some 1e-3; zero or NaN is no attitude at all.
-    if !((q.norm() - 1.0).abs() < 0.01) {
+    if !q.norm().is_finite() || (q.norm() - 1.0).abs() > 0.01 {
         return None;
     }
     let rates = vector(data.rollspeed, data.pitchspeed, data.yawspeed)?;
