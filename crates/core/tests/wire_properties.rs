@@ -5,6 +5,7 @@ mod common;
 
 use common::messages::{all_commands, all_down, all_plans, all_up, envelope};
 use common::{formula, seeded, trajectory, vec3};
+use fleet_core::formula::Formula;
 use fleet_core::types::{Nanos, Quat, Reference, Setpoint, State};
 use fleet_core::wire::{
     DecodeError, Down, Envelope, Heartbeat, MAX_BYTES, Mode, Offer, Plan, Telemetry, Up, decode, encode, keys,
@@ -163,8 +164,27 @@ fn nothing_that_is_not_finite_is_sent() {
 #[test]
 fn nesting_without_end_is_refused() {
     for byte in [0x81, 0xa1, 0xc1, 0x9f] {
-        assert!(matches!(decode::<Plan>(&[byte; 100_000]), Err(DecodeError::Malformed(_))));
+        assert_eq!(decode::<Plan>(&[byte; 100_000]), Err(DecodeError::TooDeep));
     }
+}
+
+#[test]
+fn what_is_encoded_is_never_too_deep_to_be_decoded() {
+    let mut deepest = 0;
+    for depth in 1..100 {
+        let mut plan = all_plans().remove(0);
+        for _ in 0..depth {
+            plan.clauses[0].formula = Formula::Not { f: Box::new(plan.clauses[0].formula.clone()) };
+        }
+        match encode(&plan) {
+            Ok(bytes) => {
+                assert_eq!(Plan::from_bytes(&bytes).unwrap(), plan);
+                deepest = depth;
+            }
+            Err(error) => assert_eq!(error, DecodeError::TooDeep),
+        }
+    }
+    assert!((50..64).contains(&deepest), "{deepest}");
 }
 
 #[test]

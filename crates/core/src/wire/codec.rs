@@ -7,8 +7,8 @@ use thiserror::Error;
 
 /// Largest message or plan file [bytes] (design.md, Wire).
 pub const MAX_BYTES: usize = 256 * 1024;
-/// Deepest nesting that is decoded; bounds the stack on hostile input.
-const MAX_DEPTH: usize = 64;
+/// Deepest nesting of lists and maps in a message; bounds the stack on hostile input.
+pub const MAX_DEPTH: usize = 64;
 
 /// Why bytes are not a message.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -25,6 +25,9 @@ pub enum DecodeError {
     /// Another version of the format.
     #[error("schema {0}; this build speaks 1")]
     Schema(u16),
+    /// Lists and maps are nested deeper than [`MAX_DEPTH`].
+    #[error("nested deeper than 64 levels")]
+    TooDeep,
     /// A number is NaN or infinite.
     #[error("a number is not finite")]
     NotFinite,
@@ -33,11 +36,11 @@ pub enum DecodeError {
 /// CBOR of `value` with named fields.
 ///
 /// # Errors
-/// When the value holds a number that is not finite, or is larger than [`MAX_BYTES`].
+/// When the value could not be decoded again: too large, too deep, or with a number that is not finite.
 pub fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>, DecodeError> {
     let tree =
         ciborium::Value::serialized(value).map_err(|error| DecodeError::Malformed(error.to_string()))?;
-    check_finite(&tree)?;
+    check(&tree, MAX_DEPTH)?;
     let mut bytes = Vec::new();
     ciborium::into_writer(&tree, &mut bytes).map_err(|error| DecodeError::Malformed(error.to_string()))?;
     if bytes.len() > MAX_BYTES {
@@ -56,11 +59,14 @@ pub fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> {
     }
     let mut rest = bytes;
     let tree: ciborium::Value = ciborium::de::from_reader_with_recursion_limit(&mut rest, MAX_DEPTH)
-        .map_err(|error| DecodeError::Malformed(error.to_string()))?;
+        .map_err(|error| match error {
+            ciborium::de::Error::RecursionLimitExceeded => DecodeError::TooDeep,
+            other => DecodeError::Malformed(other.to_string()),
+        })?;
     if !rest.is_empty() {
         return Err(DecodeError::Trailing(rest.len()));
     }
-    check_finite(&tree)?;
+    check(&tree, MAX_DEPTH)?;
     tree.deserialized().map_err(|error| DecodeError::Malformed(error.to_string()))
 }
 
@@ -92,15 +98,21 @@ pub fn plan_hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn check_finite(value: &ciborium::Value) -> Result<(), DecodeError> {
+/// Numbers are finite, and lists and maps are nested at most `depth` deep.
+fn check(value: &ciborium::Value, depth: usize) -> Result<(), DecodeError> {
     use ciborium::Value;
+    let inner = || depth.checked_sub(1).ok_or(DecodeError::TooDeep);
     match value {
         Value::Float(x) if !x.is_finite() => Err(DecodeError::NotFinite),
-        Value::Array(items) => items.iter().try_for_each(check_finite),
-        Value::Map(pairs) => {
-            pairs.iter().try_for_each(|(k, v)| check_finite(k).and_then(|()| check_finite(v)))
+        Value::Array(items) => {
+            let depth = inner()?;
+            items.iter().try_for_each(|item| check(item, depth))
         }
-        Value::Tag(_, inner) => check_finite(inner),
+        Value::Map(pairs) => {
+            let depth = inner()?;
+            pairs.iter().try_for_each(|(k, v)| check(k, depth).and_then(|()| check(v, depth)))
+        }
+        Value::Tag(_, tagged) => check(tagged, inner()?),
         _ => Ok(()),
     }
 }

@@ -44,6 +44,7 @@ pub enum Down {
 /// What a drone sends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[allow(clippy::large_enum_variant)] // one at a time, a few a second: a box would only add noise
 pub enum Up {
     /// On `up/heartbeat`, 5 Hz.
     Heartbeat(Heartbeat),

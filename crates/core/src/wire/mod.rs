@@ -11,7 +11,7 @@ pub mod keys;
 mod plan;
 mod report;
 
-pub use codec::{DecodeError, MAX_BYTES, decode, encode, plan_hash};
+pub use codec::{DecodeError, MAX_BYTES, MAX_DEPTH, decode, encode, plan_hash};
 pub use command::{Ack, AckResult, Command, Commit, Offer, RejectCode};
 pub use envelope::{Down, Envelope, SCHEMA, Up};
 pub use plan::{ClauseResult, DronePlan, Pad, Plan, PlanStatus, PlannedClause, Region, Visit};
