@@ -74,6 +74,7 @@ fn committed_replans_keep_limits_and_clearance_at_dense_samples() {
             };
             assert!(r.v.amax() <= 3.0 + extra_v + 1e-6, "speed {} at {t}", r.v.amax());
             assert!(r.a.amax() <= 3.0 + extra_a + 1e-6, "acceleration {} at {t}", r.a.amax());
+            assert!(r.j.amax() <= 20.0 + 1e-3, "jerk {} at {t}", r.j.amax());
             for name in &plan.obstacles {
                 assert!(plan.region(name).unwrap().outside(&r.p) > 0.0, "{name} at {t}");
             }

@@ -4,7 +4,7 @@
 //! peers' plans, not with the rows that the solver was given.
 
 use super::corridor::Scene;
-use super::start::{Allowance, knot_after, recovery_depth, recovery_time};
+use super::start::{Allowance, JERK_MAX, knot_after, recovery_depth, recovery_time};
 use crate::trajectory::clearance::{max_abs, min_inside, min_outside, min_value};
 use crate::trajectory::{Knot, Trajectory};
 use crate::types::Vec3;
@@ -12,6 +12,8 @@ use thiserror::Error;
 
 /// Rounding that a bound may be exceeded by [its own unit].
 const ROUNDING: f64 = 1e-6;
+/// The same for jerk [m/s^3]: it is 60 / h^3 times a difference of positions, so more is lost.
+const JERK_ROUNDING: f64 = 1e-3;
 /// Largest jump at a splice [m, m/s, m/s^2]; rounding of coordinates of some hundred metres.
 const JUMP: f64 = 1e-8;
 /// The heading may turn this much faster than planned while the start's offset fades: the limit is
@@ -109,6 +111,10 @@ fn limits(trajectory: &Trajectory, scene: &Scene<'_>) -> Result<(), CheckError> 
                     return Err(CheckError::Limit { quantity, by, t });
                 }
             }
+        }
+        let by = max_abs(&q.jerk_points(), JERK_MAX).max() - JERK_MAX;
+        if by > JERK_ROUNDING {
+            return Err(CheckError::Limit { quantity: "jerk", by, t });
         }
         let by = max_abs(&trajectory.heading_quintic(i).velocity_points(), 0.0).x
             - HEADING_HEADROOM * scene.limits.psi_rate_max;

@@ -3,7 +3,7 @@
 use super::basis::Basis;
 use super::corridor::{Side, Source};
 use super::grid::slots;
-use super::start::{Allowance, recovery_time};
+use super::start::{Allowance, JERK_MAX, recovery_time};
 use super::states::States;
 use crate::types::Limits;
 
@@ -117,6 +117,10 @@ impl Rows {
                 for i in 0..3 {
                     let t = states.times[k] + basis.h * i as f64 / 3.0;
                     rows.limit(states, k, axis, &basis.acceleration[i], push.at(axis, t));
+                }
+                // Jerk may jump at a knot, so both neighbours' coefficients count there.
+                for row in &basis.jerk {
+                    rows.limit(states, k, axis, row, JERK_MAX);
                 }
             }
             for slot in slots(states.times[k], states.times[k + 1]) {

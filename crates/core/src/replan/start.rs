@@ -7,6 +7,11 @@
 use crate::trajectory::Knot;
 use crate::types::{Limits, Vec3};
 
+/// Largest |jerk| per axis of a replan [m/s^3]. The thrust axis turns at about jerk / g = 2 rad/s:
+/// half of what PX4 allows by default (MC_ROLLRATE_MAX 220 deg/s), the rest is left for feedback.
+/// The paper bounds no jerk, but a waypoint that only a whip would reach is not reachable.
+pub const JERK_MAX: f64 = 20.0;
+
 /// Time [s] to bring back a point that is `depth` beyond a bound and moves further out at `outward`,
 /// with constant acceleration `a`: brake to rest, then rest to rest over the whole depth. Zero when
 /// it stops before the bound.
@@ -49,10 +54,16 @@ impl Allowance {
         Self { limit: limits.v_max, excess, from: times[0], until: knot_after(times, times[0] + need) }
     }
 
-    /// Acceleration [m/s^2]: jerk is free, so one segment is enough.
+    /// Acceleration [m/s^2]: fades with half of the jerk limit.
     pub fn acceleration(limits: &Limits, start: &Knot, times: &[f64]) -> Self {
         let excess = start.a.map(|a| (a.abs() - limits.a_max).max(0.0));
-        Self { limit: limits.a_max, excess, from: times[0], until: times[1] }
+        let need = excess.max() / (0.5 * JERK_MAX);
+        Self {
+            limit: limits.a_max,
+            excess,
+            from: times[0],
+            until: knot_after(times, times[0] + need).max(times[1]),
+        }
     }
 }
 
