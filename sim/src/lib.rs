@@ -6,4 +6,5 @@ pub mod autopilot;
 pub mod framing;
 pub mod log;
 pub mod plant;
+pub mod virtual_time;
 pub mod world;

@@ -1,10 +1,12 @@
-//! Simulator binary: `fleet-sim run` in real time.
+//! Simulator binary: `fleet-sim run` in real time, `fleet-sim virtual` as fast as it can.
 // Output on stdout is this program's interface; its errors go to stderr.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 #![forbid(unsafe_code)]
 
 mod exit;
+mod output;
 mod realtime;
+mod virtual_command;
 
 use clap::{Parser, Subcommand};
 use exit::Failure;
@@ -36,6 +38,24 @@ enum Command {
         #[arg(long)]
         exit_when_landed: bool,
     },
+    /// Virtual time: agents and vehicles in this one process, as fast as it can.
+    ///
+    /// Prints {"t": mission time} as it goes and {"done": true, ...} at the end. The same world and
+    /// plan give the same log, byte for byte.
+    Virtual {
+        /// The world (TOML).
+        #[arg(long)]
+        config: PathBuf,
+        /// The plan (X.plan.cbor).
+        #[arg(long)]
+        plan: PathBuf,
+        /// Where everything is written (MCAP).
+        #[arg(long)]
+        log: Option<PathBuf>,
+        /// Fly without onboard replanning, whatever the plan says.
+        #[arg(long)]
+        no_replan: bool,
+    },
 }
 
 fn main() -> ExitCode {
@@ -50,6 +70,8 @@ fn main() -> ExitCode {
         Command::Run { config, log, exit_when_landed } => {
             read_config(&config).and_then(|world| realtime::run(&world, log.as_deref(), exit_when_landed))
         }
+        Command::Virtual { config, plan, log, no_replan } => read_config(&config)
+            .and_then(|world| virtual_command::run(&world, &plan, log.as_deref(), no_replan)),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

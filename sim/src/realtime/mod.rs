@@ -6,6 +6,7 @@ mod clients;
 mod stdin;
 
 use crate::exit::Failure;
+use crate::output::print_line;
 use clients::Clients;
 use fleet_agent::record::Recorder;
 use fleet_core::types::Nanos;
@@ -14,7 +15,6 @@ use fleet_sim::world::{End, STEP, Vehicle, World, WorldConfig};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -87,7 +87,8 @@ pub fn run(config: &WorldConfig, log: Option<&Path>, exit_when_landed: bool) -> 
     if let Some(recorder) = recorder {
         recorder.finish()?;
     }
-    print_line(&Done { done: true, end: world.vehicles().iter().map(|v| (v.id(), v.end())).collect() })
+    print_line(&Done { done: true, end: world.vehicles().iter().map(|v| (v.id(), v.end())).collect() });
+    Ok(())
 }
 
 /// Steps the world until it has caught up with the wall clock.
@@ -130,16 +131,7 @@ fn print_ready(world: &World, clients: &[Clients]) -> Result<(), Failure> {
             mavlink: client.address()?.to_string(),
         });
     }
-    print_line(&Ready { ready: true, vehicles })
-}
-
-fn print_line(value: &impl Serialize) -> Result<(), Failure> {
-    let line = serde_json::to_string(value).map_err(|error| Failure::Environment(error.to_string()))?;
-    let mut out = std::io::stdout().lock();
-    // A reader that has gone away is not a reason to drop the vehicles.
-    if let Err(error) = writeln!(out, "{line}").and_then(|()| out.flush()) {
-        tracing::warn!(%error, "stdout is closed");
-    }
+    print_line(&Ready { ready: true, vehicles });
     Ok(())
 }
 
