@@ -123,7 +123,9 @@ def test_answers_time_and_status_and_is_alive(start: Callable[..., Agent]) -> No
         after = time.monotonic_ns()
         assert 1_000_000_000 <= first < second
         assert second - first < after - before + 2_000_000_000
-        status = eventually("status query", lambda: ask(session, _core.key_query("testfleet", "d1", "status")))
+        status = eventually(
+            "status query", lambda: ask(session, _core.key_query("testfleet", "d1", "status"))
+        )
         decoded = _core.decode_status(status)
         assert (decoded["drone"], decoded["mode"], decoded["hash"]) == ("d1", "idle", "")
         alive = [str(reply.ok.key_expr) for reply in session.liveliness().get("fleet/testfleet/*/alive")]
