@@ -190,11 +190,11 @@ fn start_threads(
     }
     .start(outgoing)?;
     let (solver, jobs) = Queue::bounded("solver", JOB_CAPACITY);
-    let (drone, answers) = (agent.drone.clone(), wake.clone());
-    thread("solver", move || worker::run(&drone, &plans, &jobs, &answers))?;
+    let (drone, committed, answers) = (agent.drone.clone(), plans.clone(), wake.clone());
+    thread("solver", move || worker::run(&drone, &committed, &jobs, &answers))?;
     let (disk, jobs) = Queue::bounded("disk", JOB_CAPACITY);
     let (directory, answers) = (settings.state_dir.join(&agent.drone), wake.clone());
-    thread("disk", move || persist::run(&directory, &jobs, &answers))?;
+    thread("disk", move || persist::run(&directory, &plans, &jobs, &answers))?;
     let outboxes = Outboxes { comms, solver, disk, record };
     Ok((outboxes, Threads { comms: comms_thread, open, record: record_thread }))
 }

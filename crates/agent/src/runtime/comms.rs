@@ -58,7 +58,7 @@ pub struct Comms {
     pub endpoints: Vec<String>,
     /// Answers the `time` query.
     pub clock: Clock,
-    /// Remembers offered plans.
+    /// Holds the committed plan.
     pub plans: Plans,
     /// Takes what arrives.
     pub wake: Queue<Wake>,
@@ -130,10 +130,9 @@ impl Comms {
         let session = zenoh::open(config(&self.endpoints)?).wait()?;
         for channel in [DownChannel::Plan, DownChannel::Commit, DownChannel::Cmd] {
             let this = self.clone();
-            let keep = channel == DownChannel::Plan;
             session
                 .declare_subscriber(keys::down(&self.fleet, &self.drone, channel))
-                .callback(move |sample| this.take_down(&sample, keep))
+                .callback(move |sample| this.take_down(&sample))
                 .background()
                 .wait()?;
         }
@@ -168,15 +167,12 @@ impl Comms {
         Ok((session, token))
     }
 
-    fn take_down(&self, sample: &Sample, keep: bool) {
+    fn take_down(&self, sample: &Sample) {
         let bytes = sample.payload().to_bytes();
         // Larger messages are refused by the step unread; they must not fill the queue or the log.
         if bytes.len() > wire::MAX_BYTES + ENVELOPE {
             tracing::warn!(bytes = bytes.len(), key = %sample.key_expr(), "message is too large, dropped");
             return;
-        }
-        if keep {
-            self.plans.note(&bytes);
         }
         let _ = self.wake.offer(Wake::Input(Input::Ground { bytes: bytes.into_owned() }));
     }

@@ -1,8 +1,9 @@
 //! The thread that writes what must survive a power cut.
 
 use super::Wake;
+use super::plans::Plans;
 use super::queue::Queue;
-use crate::io::Input;
+use crate::io::{Input, PLAN_FILE};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -19,13 +20,14 @@ pub struct Job {
     pub bytes: Vec<u8>,
 }
 
-/// Writes until the jobs end; every job is answered on the wake queue.
-pub fn run(directory: &Path, jobs: &Receiver<Job>, wake: &Queue<Wake>) {
+/// Writes until the jobs end; every job is answered on the wake queue. A committed plan is also
+/// noted in `plans`, before the answer.
+pub fn run(directory: &Path, plans: &Plans, jobs: &Receiver<Job>, wake: &Queue<Wake>) {
     for job in jobs {
         let ok = match write_atomically(directory, &job.name, &job.bytes) {
             Ok(path) => {
                 tracing::debug!(path = %path.display(), bytes = job.bytes.len(), "written");
-                true
+                note(plans, job.name == PLAN_FILE, job.bytes)
             }
             Err(error) => {
                 tracing::error!(directory = %directory.display(), name = job.name, %error, "cannot write");
@@ -34,6 +36,19 @@ pub fn run(directory: &Path, jobs: &Receiver<Job>, wake: &Queue<Wake>) {
         };
         if wake.offer(Wake::Input(Input::Persisted { id: job.id, ok })).is_err() {
             tracing::error!(id = job.id, "a file was written but the answer is lost");
+        }
+    }
+}
+
+fn note(plans: &Plans, is_plan: bool, bytes: Vec<u8>) -> bool {
+    if !is_plan {
+        return true;
+    }
+    match plans.note(bytes) {
+        Ok(()) => true,
+        Err(error) => {
+            tracing::error!(%error, "the committed plan cannot be read back");
+            false
         }
     }
 }

@@ -1,9 +1,9 @@
-//! Plans that were offered, for the threads that need more than the step puts out.
+//! Plans that were committed, for the threads that need more of them than the step puts out.
 
-use fleet_core::wire::{self, Down, Envelope, Plan};
+use fleet_core::wire::{self, Plan};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// How many offers are remembered: the committed plan, the next one, and some that were refused.
+/// How many are remembered: the committed plan and the ones before it.
 const REMEMBERED: usize = 4;
 
 /// A plan file and its content.
@@ -17,33 +17,31 @@ pub struct PlanFile {
     pub plan: Plan,
 }
 
-/// The last offers, by hash. Shared by comms and solver threads; the control thread never locks it.
+/// The last plans, by hash. Shared by disk, comms and solver threads; the control thread never locks
+/// it.
 #[derive(Clone, Debug, Default)]
 pub struct Plans {
     files: Arc<Mutex<Vec<Arc<PlanFile>>>>,
 }
 
 impl Plans {
-    /// Remembers the plan in an offer; anything else, or a plan that does not match its hash, is
-    /// left to the step to refuse.
-    pub fn note(&self, envelope: &[u8]) {
-        let Ok(Envelope { body: Down::Offer(offer), .. }) = Envelope::<Down>::from_bytes(envelope) else {
-            return;
-        };
-        self.note_file(offer.plan, &offer.hash);
-    }
-
-    fn note_file(&self, bytes: Vec<u8>, hash: &str) {
-        if wire::plan_hash(&bytes) != hash || self.get(hash).is_some() {
-            return;
+    /// Remembers a plan file.
+    ///
+    /// # Errors
+    /// When the bytes are no plan.
+    pub fn note(&self, bytes: Vec<u8>) -> Result<(), wire::DecodeError> {
+        let hash = wire::plan_hash(&bytes);
+        if self.get(&hash).is_some() {
+            return Ok(());
         }
-        let Ok(plan) = wire::decode::<Plan>(&bytes) else { return };
-        let file = Arc::new(PlanFile { hash: hash.to_owned(), bytes, plan });
+        let plan = wire::decode::<Plan>(&bytes)?;
+        let file = Arc::new(PlanFile { hash, bytes, plan });
         let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
         if files.len() == REMEMBERED {
             files.remove(0);
         }
         files.push(file);
+        Ok(())
     }
 
     /// The plan with this hash; asking for it keeps it from being forgotten next.

@@ -67,7 +67,7 @@ fn prepare<'a>(
     let current = match known {
         Some(current) => current,
         None => {
-            let file = plans.get(hash).ok_or_else(|| format!("plan {hash} was never received"))?;
+            let file = plans.get(hash).ok_or_else(|| format!("plan {hash} was never committed"))?;
             let replanner = Replanner::new(&file.plan, drone).map_err(|error| error.to_string())?;
             (hash.to_owned(), replanner)
         }
