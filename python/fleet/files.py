@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from fleet.faults import bad_input
 
 if TYPE_CHECKING:
+    from fleet import _core
     from fleet.scenario import Scenario
 
 Kind = Literal["scenario", "plan", "log"]
@@ -20,7 +21,7 @@ _MCAP_MAGIC = b"\x89MCAP0\r\n"
 class PlanFile:
     """A plan with the exact bytes of its file; ``hash`` is their SHA-256."""
 
-    plan: dict[str, Any]
+    plan: _core.Plan
     payload: bytes
     hash: str
 
@@ -57,7 +58,7 @@ def read_plan(path: Path) -> PlanFile:
     except OSError as error:
         raise bad_input("file", f"cannot be read: {error.strerror}", file=str(path)) from error
     try:
-        plan: dict[str, Any] = dict(_core.decode_plan(payload))
+        plan = _core.decode_plan(payload)
     except ValueError as error:
         raise bad_input(
             "plan",

@@ -167,8 +167,6 @@ def _start_programs(mission: PlanFile, around: Surroundings, children: Children,
 def _agent_argv(
     program: Path, drone: str, vehicle: dict[str, Any], mission: PlanFile, around: Surroundings
 ) -> list[str]:
-    state = around.run.state(drone)
-    state.mkdir(parents=True, exist_ok=True)
     options = {
         "--fleet": mission.plan["fleet"],
         "--drone": drone,
@@ -176,7 +174,7 @@ def _agent_argv(
         "--mavlink": f"udpout:{vehicle['mavlink']}",
         "--system": str(vehicle["system"]),
         "--record": str(around.run.part(drone)),
-        "--state-dir": str(state),
+        "--state-dir": str(around.run.state),
     }
     flags = ["--exit-when-landed", *(["--insecure"] if around.insecure else [])]
     return [str(program), *(word for pair in options.items() for word in pair), *flags]

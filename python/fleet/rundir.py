@@ -47,9 +47,10 @@ class RunDir:
         """What one process says."""
         return self.root / "parts" / f"{name}.stderr"
 
-    def state(self, drone: str) -> Path:
-        """Where an agent keeps what must survive its restart."""
-        return self.root / "state" / drone
+    @property
+    def state(self) -> Path:
+        """Where the agents keep what must survive a restart, each in a folder of its own."""
+        return self.root / "state"
 
 
 @contextmanager

@@ -174,7 +174,7 @@ class Link:
 
     def _silent(self, waiting: list[Message], within_s: float, what: str) -> EnvironmentError_:
         names = ", ".join(message.drone for message in waiting)
-        garbled = f" (an answer could not be read: {self._garbled})" if self._garbled else ""
+        garbled = f" (a message could not be read: {self._garbled})" if self._garbled else ""
         return environment(
             "peer",
             f"{names} did not answer {what} within {within_s:g} s: is fleet-agent running with "
@@ -190,6 +190,10 @@ class Link:
             return
         body: dict[str, Any] = dict(envelope["body"])
         if body.get("kind") != "ack":
+            return
+        if body["of"] == "unknown":
+            # The drone could not read what we sent, so it cannot say which message it was.
+            self._garbled = f"{body['drone']}: {body['outcome'].get('reason', '')}"
             return
         with self._changed:
             # The first answer counts; a later one answers a copy of the message.
