@@ -74,3 +74,42 @@ fn prepare<'a>(
     };
     Ok(&mut ready.insert(current).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fleet_core::trajectory::Knot;
+    use fleet_core::types::Vec3;
+
+    /// A request must always be answered: the step waits for its answer.
+    #[test]
+    fn a_request_for_an_unknown_plan_is_answered_with_the_reason() {
+        let (wake, woken) = Queue::bounded("wake", 4);
+        let (jobs, work) = Queue::bounded("jobs", 4);
+        let start = Knot {
+            t: 1.0,
+            p: Vec3::zeros(),
+            v: Vec3::zeros(),
+            a: Vec3::zeros(),
+            psi: 0.0,
+            psi_rate: 0.0,
+            psi_acc: 0.0,
+        };
+        let request = SolveRequest {
+            id: 7,
+            hash: "abc".to_owned(),
+            t_event: 0.9,
+            deviation: 0.5,
+            start,
+            rejoin: vec![5.0],
+        };
+        jobs.offer(Job::Prepare { hash: "abc".to_owned() }).unwrap();
+        jobs.offer(Job::Solve(Box::new(request))).unwrap();
+        drop(jobs);
+        run("d1", &Plans::default(), &work, &wake);
+        let Ok(Wake::Input(Input::Solved(answer))) = woken.try_recv() else { panic!("no answer") };
+        assert_eq!((answer.id, answer.outcome), (7, ReplanOutcome::Refused));
+        assert_eq!(answer.reason, "plan abc was never committed");
+        assert!(woken.try_recv().is_err());
+    }
+}
