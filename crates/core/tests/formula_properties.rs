@@ -5,6 +5,7 @@ mod common;
 
 use common::{HORIZON, SAMPLE, formula, names, predicate, sampled, tracks, trajectory, window};
 use fleet_core::formula::{Compiled, Formula, FormulaError, bound, compile, exact};
+use fleet_core::trajectory::Trajectory;
 use fleet_core::types::Vec3;
 use proptest::prelude::*;
 
@@ -103,18 +104,8 @@ proptest! {
     #![proptest_config(common::seeded(256))]
 
     #[test]
-    fn the_bound_is_below_every_refinement_of_the_samples(
-        f in formula(), a in trajectory(), b in trajectory()
-    ) {
-        let bound = bound::lower_bound(&compiled(&f), &[&a, &b]).unwrap();
-        for refinement in [1, 7] {
-            let sample = SAMPLE / f64::from(refinement);
-            let fine = compile(&f, &names(), sample).unwrap();
-            let count = fine.root.horizon() + 1;
-            let tracks = [sampled(&a, sample, count), sampled(&b, sample, count)];
-            let exact = exact::evaluate(&fine, &tracks).unwrap();
-            prop_assert!(bound.rho <= exact.rho, "bound {} above exact {} at 1/{}", bound.rho, exact.rho, refinement);
-        }
+    fn the_bound_is_below_every_refinement_of_the_samples(f in formula(), a in trajectory(), b in trajectory()) {
+        below_every_refinement(&f, &[&a, &b])?;
     }
 
     #[test]
@@ -138,6 +129,46 @@ proptest! {
         let value = rho(&f, &[sampled(&a, SAMPLE, 1), sampled(&b, SAMPLE, 1)]);
         prop_assert!((value - bound.rho - bound::ROUNDING).abs() < 1e-12);
     }
+}
+
+proptest! {
+    #![proptest_config(common::seeded(4096))]
+
+    /// Until and its dual, bare and over an interval: rare in random formulas, and the hardest to bound.
+    #[test]
+    fn the_bound_of_until_is_below_every_refinement_of_the_samples(
+        left in predicate(), right in predicate(), inner in window(), outer in window(), negated in any::<bool>(),
+        a in trajectory(), b in trajectory(),
+    ) {
+        let until = |left: &Formula| Formula::Until {
+            from: inner.0, to: inner.1, left: boxed(left), right: boxed(&right)
+        };
+        let sign = |f| if negated { Formula::Not { f: Box::new(f) } } else { f };
+        let held = sign(until(&left));
+        below_every_refinement(&held, &[&a, &b])?;
+        let always = Formula::Always { from: outer.0, to: outer.1, f: Box::new(held) };
+        below_every_refinement(&always, &[&a, &b])?;
+    }
+}
+
+/// The exact value at the samples themselves and at finer ones may not be below the bound.
+fn below_every_refinement(f: &Formula, trajectories: &[&Trajectory; 2]) -> Result<(), TestCaseError> {
+    let bound = bound::lower_bound(&compiled(f), trajectories).unwrap();
+    for refinement in [1, 7] {
+        let sample = SAMPLE / f64::from(refinement);
+        let fine = compile(f, &names(), sample).unwrap();
+        let count = fine.root.horizon() + 1;
+        let tracks = trajectories.map(|t| sampled(t, sample, count));
+        let exact = exact::evaluate(&fine, &tracks).unwrap();
+        prop_assert!(
+            bound.rho <= exact.rho,
+            "bound {} above exact {} at 1/{}",
+            bound.rho,
+            exact.rho,
+            refinement
+        );
+    }
+    Ok(())
 }
 
 #[test]
