@@ -21,7 +21,7 @@ $(VENV)/.deps: requirements.lock
 	@touch $@
 
 $(VENV)/.built: $(VENV)/.deps pyproject.toml $(RUST)
-	$(BIN)/pip install --quiet --no-build-isolation --no-deps --editable .
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/pip install --quiet --no-build-isolation --no-deps --editable .
 	@touch $@
 
 demo: setup ## Plan and fly the power tower with real processes on loopback, and write the report
