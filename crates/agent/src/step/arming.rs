@@ -73,7 +73,12 @@ impl Agent {
     /// Shortens the wait for a heartbeat: acknowledgements come at once.
     pub(super) fn note_ack(&mut self, message: &VehicleMsg) {
         let VehicleMsg::Ack { request, result: 0 } = message else { return };
-        let Some(arming) = self.arming.as_mut() else { return };
+        let Some(arming) = self.arming.as_mut() else {
+            if self.disarming.is_some() && *request == Some(VehicleRequest::Arm) {
+                self.vehicle.armed = false;
+            }
+            return;
+        };
         match request {
             // Ask for the next thing in the next tick.
             Some(VehicleRequest::Mode) => {

@@ -6,7 +6,6 @@ use super::modes::{Next, Trigger, next};
 use super::offer::Refusal;
 use super::phases::TAKEOFF_LEAD;
 use super::preflight;
-use crate::io::{Output, VehicleCmd};
 use fleet_core::types::Nanos;
 use fleet_core::wire::{Command, Down, Envelope, Mode, RejectCode};
 
@@ -69,7 +68,7 @@ impl Agent {
             Command::Hold | Command::Return | Command::Land | Command::Abort => {
                 if self.mode == Mode::Idle {
                     self.arming = None;
-                    self.out.push(Output::Vehicle(VehicleCmd::Arm { arm: false, force: false }));
+                    self.disarm(now);
                 }
                 self.fire(now, trigger, "commanded");
             }
@@ -111,6 +110,7 @@ impl Agent {
         if !failures.is_empty() {
             return Err((RejectCode::Preflight, failures.join("; ")));
         }
+        self.disarming = None;
         self.arming = Some(Arming::begin(now));
         Ok(())
     }
@@ -151,7 +151,7 @@ impl Agent {
             return Err((RejectCode::Mode, "the vehicle is in the air: land it".to_owned()));
         }
         self.arming = None;
-        self.out.push(Output::Vehicle(VehicleCmd::Arm { arm: false, force: false }));
+        self.disarm(now);
         self.fire(now, Trigger::Disarm, "commanded");
         Ok(())
     }

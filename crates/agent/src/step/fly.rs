@@ -125,6 +125,9 @@ impl Agent {
         if state.p.z - pad.z > LIFTED[0] || (state.v.z > LIFTED[1] && thrust > 0.0) {
             self.lifted = true;
             self.hover = HoverEstimator::new(thrust);
+        } else if self.vehicle.on_ground == Some(false) && thrust > 0.0 {
+            // The autopilot feels it even when the position does not show it.
+            self.lifted = true;
         }
     }
 

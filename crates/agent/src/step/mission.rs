@@ -96,6 +96,12 @@ impl Mission {
         self.committed.as_ref().map_or("", |plan| plan.hash.as_str())
     }
 
+    /// Every plan that is known: committed, offered, or on its way to the disk.
+    pub fn plans(&self) -> impl Iterator<Item = &CheckedPlan> {
+        let pending = self.pending.values().map(|(Pending::Offer(_, plan) | Pending::Commit(_, plan))| plan);
+        self.committed.iter().chain(self.offered.iter()).chain(pending).map(AsRef::as_ref)
+    }
+
     /// Number for a new request to the disk.
     pub fn next_persist(&mut self) -> u64 {
         self.last_persist += 1;

@@ -47,6 +47,8 @@ pub struct Agent {
     hover: HoverEstimator,
     /// Whether this flight has left the ground.
     lifted: bool,
+    /// Last request to disarm, until it is heard.
+    disarming: Option<Nanos>,
     /// Last request for the autopilot's own landing.
     handing_over: Option<Nanos>,
     /// Last request to come back to offboard control.
@@ -86,6 +88,7 @@ impl Agent {
             controller: Controller::new(config.gains),
             hover: HoverEstimator::new(config.vehicle.hover_thrust),
             lifted: false,
+            disarming: None,
             handing_over: None,
             regaining: None,
             coasting: None,
@@ -160,6 +163,7 @@ impl Agent {
             self.hover.on_ground(0.0);
         }
         self.advance_arming(now);
+        self.advance_disarming(now);
         self.advance_phase(now);
         self.fly(now, dt);
         self.log_tick(now);

@@ -3,6 +3,8 @@
 use super::Agent;
 use super::mission::{Asked, CheckedPlan, Pending};
 use crate::io::{OFFER_FILE, Output, PLAN_FILE};
+pub use fleet_core::admission::Refusal;
+use fleet_core::admission::{self, admit};
 use fleet_core::types::Nanos;
 use fleet_core::wire::{
     AckResult, Commit, Down, Envelope, EventKind, Mode, Offer, Plan, RejectCode, decode, plan_hash,
@@ -10,9 +12,6 @@ use fleet_core::wire::{
 
 /// A message may be valid for at most this long [s].
 const VALID_MAX: f64 = 600.0;
-
-/// A refusal: code and reason.
-pub type Refusal = (RejectCode, String);
 
 impl Agent {
     /// Takes one downward message and answers it, now or when the disk has answered.
@@ -49,16 +48,15 @@ impl Agent {
 
     fn take_offer(&mut self, envelope: &Envelope<Down>, offer: &Offer, asked: &Asked) -> Result<(), Refusal> {
         self.on_the_ground()?;
-        let (epoch, seq) = (envelope.epoch, envelope.seq);
+        let epoch = envelope.epoch;
         let mission = &self.mission;
-        let known = [&mission.offered, &mission.committed];
-        let repeated = known.into_iter().flatten().any(|p| p.epoch == epoch && p.hash == offer.hash);
-        if epoch <= mission.epoch && !repeated {
-            let reason = format!("epoch {epoch} is not newer than {}: make a new epoch", mission.epoch);
+        let repeated = mission.plans().any(|p| p.epoch == epoch && p.hash == offer.hash);
+        let newest = mission.plans().map(|p| p.epoch).fold(mission.epoch, u64::max);
+        if epoch <= newest && !repeated {
+            let reason = format!("epoch {epoch} is not newer than {newest}: make a new epoch");
             return Err((RejectCode::Stale, reason));
         }
         let checked = self.check_plan(envelope.mission_id.clone(), epoch, offer)?;
-        self.mission.accept(epoch, seq);
         let id = self.mission.next_persist();
         let bytes = checked.bytes.clone();
         self.mission.pending.insert(id, Pending::Offer(asked.clone(), Box::new(checked)));
@@ -74,39 +72,17 @@ impl Agent {
             return Err((RejectCode::Hash, reason));
         }
         let plan: Plan = decode(&offer.plan).map_err(|e| (RejectCode::Malformed, e.to_string()))?;
-        if plan.schema != fleet_core::wire::SCHEMA {
-            return Err((RejectCode::Malformed, format!("plan schema {} is not spoken here", plan.schema)));
-        }
-        if plan.fleet != self.config.fleet {
-            let reason = format!("plan is for fleet {:?}, this is {:?}", plan.fleet, self.config.fleet);
-            return Err((RejectCode::WrongFleet, reason));
-        }
         let id = &self.config.drone;
-        let Some(index) = plan.drones.iter().position(|d| &d.id == id) else {
-            return Err((RejectCode::NotInPlan, format!("{id} is not in the plan")));
+        let vehicle = admission::VehicleLimits {
+            v_max: self.config.vehicle.v_max,
+            a_max: self.config.vehicle.a_max,
+            psi_rate_max: self.config.vehicle.psi_rate_max,
         };
-        self.check_limits(&plan)?;
+        admit(&plan, id, &self.config.fleet, &vehicle)?;
+        let Some(index) = plan.drones.iter().position(|d| &d.id == id) else {
+            return Err((RejectCode::NotInPlan, format!("drone {id} is not in the plan")));
+        };
         Ok(CheckedPlan { mission_id, epoch, hash, bytes: offer.plan.clone(), plan, index })
-    }
-
-    fn check_limits(&self, plan: &Plan) -> Result<(), Refusal> {
-        let vehicle = &self.config.vehicle;
-        for (name, asked, legal) in [
-            ("v_max", plan.limits.v_max, vehicle.v_max),
-            ("a_max", plan.limits.a_max, vehicle.a_max),
-            ("psi_rate_max", plan.limits.psi_rate_max, vehicle.psi_rate_max),
-        ] {
-            if !(asked > 0.0 && asked <= legal) {
-                let reason = format!("limits.{name} is {asked}; this vehicle can do {legal}");
-                return Err((RejectCode::Limits, reason));
-            }
-        }
-        let r = &plan.replan;
-        if !(r.t_e >= 0.01 && r.eta > 0.0) {
-            let reason = format!("replan: t_e {} must be at least 0.01 s and eta {} above 0 m", r.t_e, r.eta);
-            return Err((RejectCode::Limits, reason));
-        }
-        Ok(())
     }
 
     fn take_commit(
@@ -132,7 +108,6 @@ impl Agent {
             return Err((RejectCode::Hash, format!("the offered plan is {:.12}", plan.hash)));
         }
         let plan = plan.clone();
-        self.mission.accept(envelope.epoch, envelope.seq);
         let id = self.mission.next_persist();
         let bytes = plan.bytes.clone();
         self.mission.pending.insert(id, Pending::Commit(asked.clone(), plan));
@@ -157,6 +132,7 @@ impl Agent {
             self.reject(now, &asked, refusal);
             return;
         }
+        self.mission.accept(asked.epoch, asked.seq);
         if commit {
             let hash = plan.hash.clone();
             self.mission.offered = None;

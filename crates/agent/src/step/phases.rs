@@ -91,7 +91,7 @@ impl Agent {
             Mode::Return => self.enter_return(now),
             Mode::Land | Mode::Abort if !self.lifted => {
                 self.path = Path::Ground;
-                self.disarm();
+                self.disarm(now);
             }
             Mode::Land => self.enter_land(now),
             Mode::Abort => self.path = Path::Sink { psi: self.heading(now) },
@@ -99,13 +99,15 @@ impl Agent {
         }
     }
 
-    pub(super) fn disarm(&mut self) {
+    /// Asks the autopilot to disarm; repeated until it has.
+    pub(super) fn disarm(&mut self, now: Nanos) {
+        self.disarming = Some(now);
         self.out.push(Output::Vehicle(VehicleCmd::Arm { arm: false, force: false }));
     }
 
     fn enter_idle(&mut self, now: Nanos, from: Mode) {
         if self.vehicle.armed {
-            self.disarm();
+            self.disarm(now);
         }
         if self.lifted {
             self.event(now, EventKind::Landed, &format!("disarmed in mode {from:?}"));

@@ -7,6 +7,8 @@ use super::paths::Committed;
 use super::phases::Path;
 use crate::io::Output;
 use crate::{SolveRequest, SolveResult};
+use fleet_core::monitor::{DeviationMonitor, Observation};
+use fleet_core::replan::LONGEST;
 use fleet_core::trajectory::{Knot, Trajectory};
 use fleet_core::types::{Nanos, Reference, State, Vec3};
 use fleet_core::wire::{DronePlan, EventKind, Mode, RejectCode, ReplanNotice, ReplanOutcome, Up};
@@ -38,7 +40,8 @@ struct Outstanding {
 /// State of the replanner's conversation.
 #[derive(Clone, Debug, Default)]
 pub struct Replanning {
-    next_check: Option<Nanos>,
+    /// Made anew whenever the plan was not followed for a while.
+    monitor: Option<DeviationMonitor>,
     outstanding: Option<Outstanding>,
     /// A checked piece that begins in a moment.
     next: Option<Trajectory>,
@@ -55,6 +58,7 @@ impl Replanning {
         self.outstanding = None;
         self.next = None;
         self.lates = 0;
+        self.monitor = None;
     }
 }
 
@@ -82,22 +86,27 @@ impl Agent {
 
     /// Compares state and committed reference every T_e (paper, section IV-C).
     fn monitor(&mut self, now: Nanos, t: f64) {
-        if self.replan.next_check.is_some_and(|at| now < at) {
-            return;
-        }
-        let Some(plan) = &self.mission.committed else { return };
-        let (params, end) = (plan.plan.replan, plan.own().trajectory.end());
-        self.replan.next_check = Some(now.plus(params.t_e - 1e-6));
         let busy = self.replan.outstanding.is_some() || self.replan.next.is_some();
         let recent = self.replan.last_request.is_some_and(|at| now.since(at) < SPACING);
         let fresh = self.vehicle.age(now).is_some_and(|age| age <= super::fly::COAST_AFTER);
-        if !params.enabled || busy || recent || !fresh || t + REJOIN_MIN + LEAD >= end {
+        if busy || recent || !fresh {
             return;
         }
-        let Some(deviation) = self.deviation.filter(|d| *d > params.eta) else { return };
-        self.event(now, EventKind::Deviation { metres: deviation }, "deviation above eta");
+        let (Some(plan), Some(state)) = (&self.mission.committed, self.vehicle.state(now)) else { return };
+        let (params, end) = (plan.plan.replan, plan.own().trajectory.end());
+        let Some(reference) = self.reference(now) else { return };
+        // The state is carried forward to now, so it is compared with the reference of now.
+        let state = State { at: now, ..state };
+        let monitor = self.replan.monitor.get_or_insert_with(|| DeviationMonitor::new(&params));
+        let seen = monitor.update(&state, &reference.p, self.vehicle.reset_counter);
+        // Estimator resets are reported where the position comes in; here they only silence a check.
+        let Some(Observation::Deviation { metres }) = seen else { return };
+        self.event(now, EventKind::Deviation { metres }, "deviation above eta");
+        if !params.enabled || t + REJOIN_MIN + LEAD >= end {
+            return;
+        }
         self.fire(now, Trigger::Deviation, "deviation above eta");
-        if !self.request(now, t, deviation) {
+        if !self.request(now, t, metres) {
             self.fire(now, Trigger::Unsolvable, "no topic waypoint within reach");
         }
     }
@@ -200,6 +209,10 @@ impl Agent {
         let fleet = plan.own().trajectory.clone();
         self.path = Path::Plan(Committed { fleet, local: Some(piece) });
         self.replan.committed += 1;
+        // From now on the deviation counts against the new reference.
+        if let Some(monitor) = &mut self.replan.monitor {
+            monitor.rearm();
+        }
         self.fire(now, Trigger::Spliced, "local replan");
     }
 
@@ -263,7 +276,8 @@ fn candidates(own: &DronePlan, start: &Knot, v_max: f64) -> Vec<f64> {
     let mut times: Vec<f64> = own.topics.iter().copied().filter(|t| *t < end - 1e-6).chain([end]).collect();
     times.retain(|t| {
         let left = t - start.t;
-        left >= REJOIN_MIN && (own.trajectory.position(*t) - start.p).amax() <= v_max * left
+        (REJOIN_MIN..=LONGEST).contains(&left)
+            && (own.trajectory.position(*t) - start.p).amax() <= v_max * left
     });
     times.truncate(CANDIDATES);
     times

@@ -14,21 +14,22 @@ const BLOCKED: f64 = 0.5;
 impl Agent {
     /// Hands over near the pad, on contact, or when blind; then waits for the autopilot to disarm.
     pub(super) fn advance_landing(&mut self, now: Nanos) {
-        if !self.lifted {
-            let due = self.handing_over.is_none_or(|at| now.since(at) >= RETRY);
-            if self.vehicle.armed && due {
-                self.handing_over = Some(now);
-                self.disarm();
-            }
-            return;
-        }
-        if self.handing_over.is_none() && !self.near_ground(now) {
+        if !self.lifted || self.handing_over.is_none() && !self.near_ground(now) {
             return;
         }
         let due = self.handing_over.is_none_or(|at| now.since(at) >= RETRY);
         if due && self.vehicle.mode != Some(VehicleMode::Land) {
             self.handing_over = Some(now);
             self.out.push(Output::Vehicle(VehicleCmd::SetMode { mode: VehicleMode::Land }));
+        }
+    }
+
+    /// Repeats a request to disarm until it is heard. On the ground only: in the air nothing asks.
+    pub(super) fn advance_disarming(&mut self, now: Nanos) {
+        if !self.vehicle.armed || self.lifted {
+            self.disarming = None;
+        } else if self.disarming.is_some_and(|at| now.since(at) >= RETRY) {
+            self.disarm(now);
         }
     }
 

@@ -55,7 +55,8 @@ pub struct Vehicle {
     pub on_ground: Option<bool>,
     /// Last refusal or text of the autopilot, for people.
     pub last_words: String,
-    reset_counter: Option<u8>,
+    /// ODOMETRY's reset counter.
+    pub reset_counter: Option<u8>,
     jumped_at: Option<Nanos>,
     flows: BTreeMap<u8, Flow>,
 }

@@ -1,4 +1,6 @@
 //! Flights of the agent in virtual time, against a vehicle small enough to be obvious.
 
+mod admission;
+mod failures;
 mod flight;
 mod rig;

@@ -2,12 +2,14 @@
 
 use crate::io::{Input, Output, VehicleCmd, VehicleMode, VehicleMsg, VehicleRequest};
 use crate::step::{Agent, AgentConfig};
+use fleet_core::formula::Formula;
 use fleet_core::geometry::Polyhedron;
+use fleet_core::replan::Replanner;
 use fleet_core::trajectory::{Knot, Trajectory};
 use fleet_core::types::{GRAVITY, Limits, Nanos, Quat, ReplanParams, Setpoint, Vec3};
 use fleet_core::wire::{
-    AckResult, Command, Commit, Down, DronePlan, Envelope, Event, EventKind, Mode, Offer, Pad, Plan,
-    PlanStatus, Region, RejectCode, SCHEMA, Up, Visit, encode, plan_hash,
+    AckResult, ClauseResult, Command, Commit, Down, DronePlan, Envelope, Event, EventKind, Mode, Offer, Pad,
+    Plan, PlanStatus, PlannedClause, Region, RejectCode, SCHEMA, Up, Visit, encode, plan_hash,
 };
 
 pub const MISSION: &str = "00112233445566778899aabbccddeeff";
@@ -87,8 +89,12 @@ pub struct Rig {
     pub published: Vec<Up>,
     /// Bytes of every outbox, for comparison.
     pub bytes: Vec<u8>,
-    /// Requests to the solver that were not answered yet.
-    pub solves: Vec<crate::SolveRequest>,
+    /// Requests to the solver with the time of their answer.
+    pub solves: Vec<(Nanos, crate::SolveRequest)>,
+    /// How long the solver takes; none: it never answers.
+    pub solver: Option<f64>,
+    /// Number of requests to the solver.
+    pub requests: usize,
     /// Largest deviation while tracking.
     pub worst: f64,
     /// Whether the state messages arrive.
@@ -111,16 +117,33 @@ pub fn plan(drones: &[(&str, Vec3)]) -> Plan {
         regions: vec![
             Region { name: "workspace".into(), shape: space },
             Region { name: "tr1".into(), shape: target },
+            Region {
+                name: "home".into(),
+                shape: Polyhedron::from_box(Vec3::new(-20.0, -20.0, 0.0), Vec3::new(20.0, 20.0, 3.0))
+                    .expect("box"),
+            },
         ],
         workspace: "workspace".into(),
         obstacles: Vec::new(),
-        clauses: Vec::new(),
+        clauses: vec![visit_clause()],
         method: "by hand".into(),
         status: PlanStatus::Certified,
         rho: 0.5,
         rho_lower: 0.5,
         rho_bound: 1.0,
         drones: drones.iter().map(|(id, pad)| drone_plan(id, *pad)).collect(),
+    }
+}
+
+fn visit_clause() -> PlannedClause {
+    let visit = Formula::In { drone: "d1".into(), region: "tr1".into() };
+    PlannedClause {
+        id: "tr1".into(),
+        text: "eventually[0,15] d1 in tr1".into(),
+        kind: "event".into(),
+        drones: vec!["d1".into()],
+        formula: Formula::Eventually { from: 0.0, to: 15.0, f: Box::new(visit) },
+        result: ClauseResult { rho: 0.5, rho_lower: 0.5, t_tightest: 10.0 },
     }
 }
 
@@ -175,6 +198,8 @@ impl Rig {
             published: Vec::new(),
             bytes: Vec::new(),
             solves: Vec::new(),
+            solver: Some(0.02),
+            requests: 0,
             worst: 0.0,
             sensing: true,
             setpoints: Vec::new(),
@@ -294,8 +319,17 @@ impl Rig {
         self.inbox.push(Input::Vehicle(message));
     }
 
+    fn solve(&mut self) {
+        let due = self.solves.iter().position(|(at, _)| *at <= self.now);
+        if let Some((_, request)) = due.map(|i| self.solves.remove(i)) {
+            let mut replanner = Replanner::new(&self.plan, "d1").expect("in the plan");
+            self.inbox.push(Input::Solved(replanner.solve(&request)));
+        }
+    }
+
     pub fn tick(&mut self) {
         self.sense();
+        self.solve();
         let inbox = std::mem::take(&mut self.inbox);
         let outputs = self.agent.step(self.now, &inbox);
         ciborium::into_writer(&outputs, &mut self.bytes).expect("encodes");
@@ -321,7 +355,12 @@ impl Rig {
             }
             Output::Publish { message, .. } => self.published.push(*message),
             Output::Persist { id, .. } => self.inbox.push(Input::Persisted { id, ok: true }),
-            Output::Solve(request) => self.solves.push(*request),
+            Output::Solve(request) => {
+                self.requests += 1;
+                if let Some(seconds) = self.solver {
+                    self.solves.push((self.now.plus(seconds), *request));
+                }
+            }
             Output::Status(_) | Output::Tick(_) => {}
         }
     }
