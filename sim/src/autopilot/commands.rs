@@ -52,6 +52,13 @@ impl Autopilot {
             }
             MavMessage::PARAM_REQUEST_READ(m) => self.on_param_read(link, m),
             MavMessage::PARAM_SET(m) => self.on_param_set(link, m),
+            other => self.on_protocol(now, link, asker, other),
+        }
+    }
+
+    /// Clocks and missions: questions that every client may ask and that must be answered.
+    fn on_protocol(&mut self, now: Nanos, link: LinkId, asker: (u8, u8), message: &MavMessage) {
+        match message {
             MavMessage::TIMESYNC(m) if m.tc1 == 0 => {
                 let reply = TIMESYNC_DATA {
                     tc1: self.boot(now).0 as i64,
