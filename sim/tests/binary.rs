@@ -8,7 +8,7 @@
 
 use fleet_agent::mavlink::framing::frames;
 use mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage};
-use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use std::io::{BufRead, BufReader, Read};
 use std::net::UdpSocket;
 use std::path::PathBuf;
