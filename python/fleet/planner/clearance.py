@@ -161,7 +161,8 @@ def apart_rows(
 ) -> Iterator[Block]:
     """Rows that keep near pieces on both sides of the best plane now.
 
-    With r at `level` the margin is raised to what the tube asks. `lift` (3,) tilts the planes of pieces in conflict, to try another way past each other.
+    With r at `level` the margin is raised to what the tube asks. `lift` (3,) tilts the planes of pieces
+    in conflict, to try another way past each other.
     """
     margin, normals = apart_margin(w, x)
     w.posed |= margin < wanted + 2 * NEAR

@@ -153,6 +153,11 @@ def polish(steps: Steps, x: Array, reached: Margins) -> tuple[Array, Margins, in
     return best, top, count
 
 
+def blames_pair(attempt: tuple[Array, Margins, Steps]) -> bool:
+    """Whether a pair is what keeps r down, so that another way past each other could help."""
+    return any(w.clause == attempt[1].clause for w in attempt[2].apart)
+
+
 def optimise(setup: Setup, progress: Progress | None = None) -> tuple[Array, Margins, int]:
     """The best trajectory over the tilts of `LIFTS` (until one is at the bound), then polished."""
     start = warm_start(setup)
@@ -166,7 +171,7 @@ def optimise(setup: Setup, progress: Progress | None = None) -> tuple[Array, Mar
             chosen = (x, margins, steps)
         if progress is not None:
             progress("solve", chosen[1].r)
-        if (margins.share <= 1 and margins.r >= setup.bound - 10 * TOLERANCE) or not setup.problem.pairs():
+        if (margins.share <= 1 and margins.r >= setup.bound - 10 * TOLERANCE) or not blames_pair(chosen):
             break
     assert chosen is not None
     x, margins, used = polish(chosen[2], chosen[0], chosen[1]) if chosen[1].share <= 1 else (*chosen[:2], 0)

@@ -27,6 +27,8 @@ Progress = Callable[[str, float], None]
 
 #: Sharpness of smooth robustness [1/m] as multiples of the mission's c, one solve each.
 SHARPER = (1.0, 4.0, 16.0)
+#: Distance within which pieces are posed when there are clauses without a normal form [m].
+FAR = 5.0
 #: Margins round a corner are measured on parts of a piece, up to this much too low [m].
 MEASURED = 5e-3
 #: Solves with further pieces posed, when a solution passes what was not posed.
@@ -163,7 +165,7 @@ def pose_rest(program: Program, task: Problem, grid: Grid, x: Any, r: Any, c: An
     positions = {n: sampled(grid, x, d, times) for d, n in enumerate(task.ids)}
     walk = Smooth(positions, task.regions, task.sample, c)
     for part in task.spec.rest:
-        program.constrain(walk.at_start(part.formula) - r, 0.0, np.inf)
+        program.constrain(walk.conjuncts(part.formula) - r, 0.0, np.inf)
 
 
 def sampled(grid: Grid, x: Any, drone: int, times: Array) -> Any:
@@ -245,12 +247,22 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Arr
     return guess[: steps.setup.grid.size]
 
 
+def foresee(steps: Steps, x: Array) -> None:
+    """Pose pieces far around: clauses without a normal form may pull the trajectory a long way."""
+    for w in steps.beyond:
+        w.posed |= near.outside_margin(w, x)[0] < steps.setup.bound + FAR
+    for w in steps.apart:
+        w.posed |= near.apart_margin(w, x)[0] < steps.setup.bound + 2 * FAR
+
+
 def optimise(
     setup: Setup, start: Array | None = None, progress: Progress | None = None
 ) -> tuple[Array, Margins, int]:
     """Maximise r, then minimise energy at the r reached, from the warm start or from `start`."""
     steps = Steps.of(setup)
     best = warm_start(setup) if start is None else start
+    if setup.problem.spec.rest:
+        foresee(steps, best)
     top, count = steps.margins(best), 0
     for hold in (False, True):
         level = top.r - GIVEN_UP if hold else None

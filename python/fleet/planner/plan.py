@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from fleet.errors import InfeasibleError
@@ -13,13 +13,16 @@ from .ceiling import rho_bound
 from .knots import Array
 from .problem import Problem, problem
 from .result import PlanResult, result, squared_acceleration, trajectory
-from .schedule import schedule
+from .schedule import Itinerary, schedules
 from .setup import Setup, setup
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
 
 Progress = Callable[[str, float], None]
+
+#: Clearance that is worth while when no clause bounds rho [m].
+WIDEST = 5.0
 
 
 def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = "auto") -> PlanResult:
@@ -39,57 +42,67 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     mark = time.perf_counter()
     task = problem(scenario)
     bound = rho_bound(task)
+    timings |= dict.fromkeys(("route", "build", "solve", "certify"), 0.0)
     tell("route", bound)
-    way = schedule(task, min(bound, WIDEST))
-    timings["route"], mark = lap(mark)
-    stage = setup(task, way, min(bound, WIDEST))
-    tell("build", bound)
-    timings["build"], mark = lap(mark)
-    x, margins, used = optimise(stage, method, progress)
-    refuse(task, margins)
-    timings["solve"], mark = lap(mark)
-    tell("certify", margins.r)
-    tracks = [trajectory(task, way, stage.grid, x, d) for d in range(len(task.ids))]
-    energy = squared_acceleration(stage.grid, x)
-    out = result(scenario, task, way, tracks, bound=bound, method=used, int_a2=energy, timings=timings)
-    timings["certify"], mark = lap(mark)
-    return out
+    ways = list(schedules(task, min(bound, WIDEST)))
+    timings["route"], mark = lap(mark, timings["route"])
+    refusal: InfeasibleError | None = None
+    for way, used in attempts(task, ways, method):
+        stage = setup(task, way, min(bound, WIDEST))
+        tell("build", bound)
+        timings["build"], mark = lap(mark, timings["build"])
+        x, margins = optimise(stage, used, progress)
+        timings["solve"], mark = lap(mark, timings["solve"])
+        why = refuse(task, margins)
+        if why is not None:
+            refusal = refusal or why
+            continue
+        tell("certify", margins.r)
+        tracks = [trajectory(task, way, stage.grid, x, d) for d in range(len(task.ids))]
+        energy = squared_acceleration(stage.grid, x)
+        out = result(scenario, task, way, tracks, bound=bound, method=used, int_a2=energy, timings=timings)
+        timings["certify"], mark = lap(mark, timings["certify"])
+        return out
+    assert refusal is not None, "there is always an attempt, or schedules raises"
+    raise refusal
 
 
-#: Clearance that is worth while when no clause bounds rho [m].
-WIDEST = 5.0
+def attempts(task: Problem, ways: list[Itinerary], method: str) -> Iterator[tuple[Itinerary, str]]:
+    """Itineraries and methods in the order in which they are tried."""
+    if method != "auto":
+        yield from ((way, method) for way in ways)
+    elif task.spec.rest:
+        yield from ((way, "nlp") for way in ways)
+    else:
+        yield from ((way, "convex") for way in ways)
+        yield ways[0], "nlp"
 
 
-def lap(mark: float) -> tuple[float, float]:
-    """Seconds since `mark`, and the new mark."""
+def lap(mark: float, spent: float) -> tuple[float, float]:
+    """`spent` and the seconds since `mark`, and the new mark."""
     now = time.perf_counter()
-    return now - mark, now
+    return spent + now - mark, now
 
 
-def optimise(stage: Setup, method: str, progress: Progress | None) -> tuple[Array, convex.Margins, str]:
-    """Trajectories by the method asked for; "auto" takes the nonlinear program where convex steps do not do."""
-    if method == "nlp":
-        from . import nlp
-
-        x, margins, _ = nlp.optimise(stage, None, progress)
-        return x, margins, "nlp"
-    x, margins, _ = convex.optimise(stage, progress)
-    usable = margins.share <= 1 and margins.tube >= -1e-6
-    if method == "convex" or (usable and not stage.problem.spec.rest):
-        return x, margins, "convex"
+def optimise(stage: Setup, method: str, progress: Progress | None) -> tuple[Array, convex.Margins]:
+    """Trajectories by one method."""
+    if method == "convex":
+        x, margins, _ = convex.optimise(stage, progress)
+        return x, margins
     from . import nlp
 
-    x, margins, _ = nlp.optimise(stage, x, progress)
-    return x, margins, "nlp"
+    x, margins, _ = nlp.optimise(stage, None, progress)
+    return x, margins
 
 
-def refuse(task: Problem, margins: convex.Margins) -> None:
-    """Raise InfeasibleError when limits or the margins of the tube are not kept."""
+def refuse(task: Problem, margins: convex.Margins) -> InfeasibleError | None:
+    """Why trajectories do not do: limits or the margins of the tube are not kept; None when they are."""
     if margins.share > 1:
         limits = f"v_max = {task.v_max:g} m/s and a_max = {task.a_max:g} m/s^2"
         text = f"{limits} cannot be kept: the best found passes one by {100 * (margins.share - 1):.1f} %"
-        raise InfeasibleError(text, clause=margins.clause)
+        return InfeasibleError(text, clause=margins.clause)
     if margins.tube < -1e-6:
         asked = f"{task.tube:g} m (pairs {2 * task.tube:g} m and more with closing speed)"
         text = f"the best margin found is {margins.tube + task.tube:.2f} m, and the tube asks for {asked}"
-        raise InfeasibleError(text, clause=margins.clause)
+        return InfeasibleError(text, clause=margins.clause)
+    return None

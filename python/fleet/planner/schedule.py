@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -144,10 +145,12 @@ def by_hand(problem: Problem, orders: list[tuple[int, ...]]) -> list[tuple[int, 
     return out
 
 
-def schedule(problem: Problem, bound: float) -> Itinerary:
-    """The itinerary that the optimisation starts from, routed at a clearance of up to `bound` [m].
+def schedules(problem: Problem, bound: float) -> Iterator[Itinerary]:
+    """Itineraries to start from, routed at a clearance of up to `bound` [m], in order of preference.
 
-    Raises InfeasibleError, naming the clause, when even flight through at v_max misses a window.
+    The first spreads the slack evenly; then come visits as early and as late as can be, for invariants
+    that hold over a part of the mission only. Raises InfeasibleError, naming the clause, when even
+    flight through at v_max misses a window.
     """
     world = survey(problem, bound)
     for ease in (*EASE, None):
@@ -157,8 +160,13 @@ def schedule(problem: Problem, bound: float) -> Itinerary:
             continue
         orders = by_hand(problem, orders)
         timed = [event_times(problem, legs, d, order) for d, order in enumerate(orders)]
-        if all(t is not None for t in timed):
-            return itinerary(problem, world, orders, [t for t in timed if t is not None])
+        times = [t for t in timed if t is not None]
+        if len(times) == len(timed):
+            yield itinerary(problem, world, orders, times)
+            for late in (False, True):
+                shifted = [extreme_times(problem, legs, d, order, late) for d, order in enumerate(orders)]
+                yield itinerary(problem, world, orders, shifted)
+            return
     raise unreachable(problem, world)
 
 
@@ -175,6 +183,26 @@ def event_times(problem: Problem, legs: Legs, drone: int, order: tuple[int, ...]
     early = np.column_stack([windows[:, 0], spared])
     times = spread(np.array(least), early, problem.horizon, problem.sample)
     return times if times is not None else spread(np.array(least), windows, problem.horizon, problem.sample)
+
+
+def extreme_times(problem: Problem, legs: Legs, drone: int, order: tuple[int, ...], late: bool) -> Array:
+    """Times of one drone's visits, all as early or as late as legs and windows allow; multiples of T_s."""
+    out = np.zeros(len(order))
+    if late:
+        clock = problem.horizon
+        legs_after = [*(legs.between[drone, a, b] for a, b in pairwise(order)), *legs.last[drone, order[-1:]]]
+        for k in reversed(range(len(order))):
+            e = order[k]
+            clock = min(clock - legs_after[k] - legs.dwell[e], legs.windows[e, 1])
+            out[k] = np.floor(clock / problem.sample + 1e-6) * problem.sample
+        return out
+    clock, before = 0.0, -1
+    for k, e in enumerate(order):
+        clock += legs.first[drone, e] if before < 0 else legs.between[drone, before, e]
+        clock = max(clock, legs.windows[e, 0])
+        out[k] = np.ceil(clock / problem.sample - 1e-6) * problem.sample
+        clock, before = out[k] + legs.dwell[e], e
+    return np.minimum(out, legs.windows[list(order), 1]) if order else out
 
 
 def itinerary(problem: Problem, world: Map, orders: list[tuple[int, ...]], times: list[Array]) -> Itinerary:

@@ -25,7 +25,10 @@ TIP = 1e-3
 
 def soft_min(values: Any, c: Any) -> Any:
     """Smooth minimum of a column, not above the true one."""
-    return -ca.logsumexp(-c * values) / c if values.numel() > 1 else values
+    if values.numel() == 1:
+        return values
+    least = ca.mmin(values)
+    return least - ca.log(ca.sum1(ca.exp(c * (least - values)))) / c
 
 
 def soft_max(values: Any, c: Any) -> Any:
@@ -47,6 +50,19 @@ class Smooth:
     regions: Mapping[str, Array]
     sample: float
     c: Any
+
+    def conjuncts(self, formula: Formula) -> Any:
+        """Column of values whose true minimum is the robustness at time 0 [m].
+
+        Conjunctions and `always` on the outside need no smoothing: each sample is a row of its own, and
+        rows that touch few knots keep the program sparse.
+        """
+        f, first, last = negation_normal(formula), 0, 0
+        while f["op"] == "always":
+            first, last, f = first + self.index(f["from"]), last + self.index(f["to"]), f["f"]
+        if f["op"] == "and" and first == last == 0:
+            return ca.vertcat(*(self.conjuncts(g) for g in f["fs"]))
+        return self.signal(f, first, last)
 
     def at_start(self, formula: Formula) -> Any:
         """Smooth robustness at time 0 (scalar expression) [m]."""
