@@ -19,7 +19,9 @@ def random_legs(rng: np.random.Generator, drones: int, n: int, tight: float) -> 
     start = rng.uniform(0, 8, n)
     windows = np.column_stack([start, start + rng.uniform(2, tight, n)])
     dwell = rng.choice([0.0, 0.5], n)
-    return Legs(first, np.repeat(between[None], drones, 0), first, np.zeros(drones), windows, dwell, 2 * tight)
+    return Legs(
+        first, np.repeat(between[None], drones, 0), first, np.zeros(drones), windows, dwell, 2 * tight
+    )
 
 
 def brute_force(legs: Legs) -> tuple[float, float] | None:

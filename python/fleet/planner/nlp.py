@@ -27,8 +27,6 @@ Progress = Callable[[str, float], None]
 
 #: Sharpness of smooth robustness [1/m] as multiples of the mission's c, one solve each.
 SHARPER = (1.0, 4.0, 16.0)
-#: Distance within which pieces are posed when there are clauses without a normal form [m].
-FAR = 5.0
 #: Margins round a corner are measured on parts of a piece, up to this much too low [m].
 MEASURED = 5e-3
 #: Solves with further pieces posed, when a solution passes what was not posed.
@@ -247,31 +245,21 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Arr
     return guess[: steps.setup.grid.size]
 
 
-def foresee(steps: Steps, x: Array) -> None:
-    """Pose pieces far around: clauses without a normal form may pull the trajectory a long way."""
-    for w in steps.beyond:
-        w.posed |= near.outside_margin(w, x)[0] < steps.setup.bound + FAR
-    for w in steps.apart:
-        w.posed |= near.apart_margin(w, x)[0] < steps.setup.bound + 2 * FAR
-
-
 def optimise(
     setup: Setup, start: Array | None = None, progress: Progress | None = None
 ) -> tuple[Array, Margins, int]:
     """Maximise r, then minimise energy at the r reached, from the warm start or from `start`."""
     steps = Steps.of(setup)
     best = warm_start(setup) if start is None else start
-    if setup.problem.spec.rest:
-        foresee(steps, best)
     top, count = steps.margins(best), 0
     for hold in (False, True):
-        level = top.r - GIVEN_UP if hold else None
-        if hold and top.share > 1:
+        if hold and not usable(top):
             break
-        x = best
+        level = top.r - GIVEN_UP if hold else None
+        x, last = best, top
         for _ in range(ROUNDS):
             steps.rows(x, setup.bound if level is None else level)
-            found = solve(steps, x, top, level)
+            found = solve(steps, x, last, level)
             count += 1
             if found is None:
                 break
@@ -279,9 +267,15 @@ def optimise(
             if progress is not None:
                 progress("solve", now.r)
             good = now.share <= 1 and now.r >= level - MEASURED if level is not None else better(now, top)
+            done = now.r >= (setup.bound - TOLERANCE if level is None else level - MEASURED)
             if good:
                 best, top = found, now
-            x = found
-            if good and (level is not None or now.r >= setup.bound - TOLERANCE):
+            if done or abs(now.r - last.r) < TOLERANCE:
                 break
+            x, last = found, now
     return best, top, count
+
+
+def usable(margins: Margins) -> bool:
+    """Whether limits and the margins of the tube are kept, as far as they are measured."""
+    return margins.share <= 1 and margins.tube >= -MEASURED

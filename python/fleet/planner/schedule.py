@@ -20,8 +20,8 @@ from .spec import Visit
 EASE = (1.4, 1.15, 1.0)
 #: Share of the mission that visits keep from the ends of their windows, where time allows.
 SPARE = 0.04
-#: Shares of the wanted clearance at which routes are sought, the widest first.
-CLEARANCE = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
+#: Shares of the wanted clearance at which routes are sought, the widest first; never less than the tube.
+CLEARANCE = (1.0, 0.8, 0.6, 0.4, 0.0)
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Map:
 
 
 def survey(problem: Problem, bound: float) -> Map:
-    """Ways between all places at the widest clearance that still connects every drone and visit."""
+    """Ways between all places at the widest clearance, at least the tube, that connects all visits."""
     n = len(problem.ids)
     regions = sorted({r for v in problem.spec.visits for _, r in v.options} | set(problem.homes))
     points = np.vstack([problem.starts, *(problem.centers[r][None] for r in regions)])
@@ -72,7 +72,8 @@ def survey(problem: Problem, bound: float) -> Map:
     obstacles = [problem.regions[o] for o in problem.obstacles]
     needed = {(d, p) for d in range(n) for p in (*place[d], home[d]) if p >= 0}
     for share in CLEARANCE:
-        ways = network(points, problem.regions[problem.workspace], obstacles, share * bound)
+        margin = max(share * bound, problem.tube)
+        ways = network(points, problem.regions[problem.workspace], obstacles, margin)
         if all(ways.path(d, p) is not None for d, p in needed):
             break
     return Map(ways, points, names, tuple(range(n)), home, place)
@@ -229,7 +230,9 @@ def unreachable(problem: Problem, world: Map) -> InfeasibleError:
         soonest = float(legs.first[:, e].min())
         name = visit.options[0][1]
         if not np.isfinite(soonest):
-            text = f"no way from any drone to {name} clear of the obstacles"
+            text = (
+                f"no way from any drone to {name} that keeps {problem.tube:g} m (the tube) to all obstacles"
+            )
             return InfeasibleError(text, clause=visit.clause)
         if soonest > visit.window[1] + 1e-9:
             late = f"{name} cannot be reached by {visit.window[1]:.2f} s"
@@ -239,7 +242,9 @@ def unreachable(problem: Problem, world: Map) -> InfeasibleError:
     orders = assign(replace(legs, windows=open_windows, horizon=np.inf))
     if orders is None:
         clause = visits[0].clause if visits else None
-        text = "no drone can make every visit and come home clear of the obstacles"
+        text = (
+            f"no drone can come home from its visits and keep {problem.tube:g} m (the tube) to all obstacles"
+        )
         return InfeasibleError(text, clause=clause)
     return too_late(problem, legs, by_hand(problem, orders))
 
