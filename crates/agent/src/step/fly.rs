@@ -2,7 +2,7 @@
 
 use super::Agent;
 use super::modes::{Trigger, flies};
-use super::phases::SPOOL;
+use super::phases::{Path, SPOOL};
 use crate::io::{Output, VehicleCmd, VehicleMode};
 use fleet_core::hover::HoverEstimator;
 use fleet_core::types::{Nanos, Quat, Reference, Setpoint, State, Vec3};
@@ -31,10 +31,14 @@ impl Agent {
         self.watch_state(now);
         self.watch_lift(now);
         self.watch_mode(now);
+        let handed_over = self.handing_over.is_some() && self.vehicle.mode == Some(VehicleMode::Land);
+        if handed_over {
+            // From here on the autopilot follows nothing of ours.
+            self.path = Path::Ground;
+        }
         let state = self.vehicle.state(now);
         let reference = self.reference(now);
         self.deviation = state.zip(reference).map(|(s, r)| (s.p - r.p).norm());
-        let handed_over = self.handing_over.is_some() && self.vehicle.mode == Some(VehicleMode::Land);
         let setpoint = match self.mode {
             Mode::Idle if self.arming.is_none() => None,
             Mode::Released => None,

@@ -7,6 +7,7 @@ mod arming;
 mod command;
 mod config;
 mod fly;
+mod homeward;
 mod mission;
 mod modes;
 mod offer;

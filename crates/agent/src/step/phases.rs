@@ -1,6 +1,7 @@
 //! Mode changes, what each mode flies, and the triggers that time brings.
 
 use super::Agent;
+use super::homeward::corners;
 use super::modes::{Next, Trigger, next};
 use super::paths::{Committed, Leg, Slowdown, brake_time, rest_time};
 use crate::io::{Output, VehicleCmd, VehicleMode};
@@ -164,13 +165,8 @@ impl Agent {
         let Some((from, psi)) = self.departure(now) else { return };
         let Some(plan) = &self.mission.committed else { return };
         let brake = Leg::brake(now, from, psi, GENTLE);
-        let (stop, pad) = (brake.goal(), plan.own().pad.p);
         let landing = &self.config.landing;
-        let roof = plan.plan.region(&plan.plan.workspace).map_or(stop.z, |w| {
-            ceiling(w, &stop).min(ceiling(w, &Vec3::new(pad.x, pad.y, stop.z))) - landing.ceiling_margin
-        });
-        let height = roof.max(stop.z);
-        let corners = [Vec3::new(stop.x, stop.y, height), Vec3::new(pad.x, pad.y, height)];
+        let corners = corners(&plan.plan, &brake.goal(), &plan.own().pad.p, landing.ceiling_margin);
         let mut legs = vec![brake];
         for corner in corners {
             let (start, from) = (legs[legs.len() - 1].end(), legs[legs.len() - 1].goal());
@@ -290,11 +286,4 @@ impl Agent {
 fn heading_of(state: &State) -> f64 {
     let x = state.q * Vec3::x();
     x.y.atan2(x.x)
-}
-
-/// Largest height over `p` that is inside `workspace` [m]; the height of `p` when it has no roof.
-fn ceiling(workspace: &fleet_core::geometry::Polyhedron, p: &Vec3) -> f64 {
-    let above = workspace.faces().iter().filter(|f| f.a.z > 1e-6);
-    let roof = above.map(|f| (f.b - f.a.x * p.x - f.a.y * p.y) / f.a.z).fold(f64::INFINITY, f64::min);
-    if roof.is_finite() { roof } else { p.z }
 }

@@ -1,6 +1,7 @@
 //! What the agent accepts from the ground, and the code of every refusal.
 
-use super::rig::{MISSION, Rig, code, plan};
+use super::plans::plan;
+use super::rig::{MISSION, Rig, code};
 use crate::io::{Input, Output, PLAN_FILE, VehicleMsg};
 use fleet_core::types::{Nanos, Vec3};
 use fleet_core::wire::{AckResult, Command, Commit, Down, Mode, Offer, Plan, RejectCode, encode, plan_hash};

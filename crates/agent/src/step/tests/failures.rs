@@ -1,6 +1,7 @@
 //! Late, missing and broken input; peers that do not play along; determinism.
 
-use super::rig::{MISSION, Rig, plan};
+use super::plans::plan;
+use super::rig::{MISSION, Rig};
 use crate::io::{Input, Output, VehicleCmd, VehicleMode, VehicleMsg};
 use crate::step::{Agent, AgentConfig};
 use fleet_core::types::{Nanos, Quat, Vec3};
@@ -168,6 +169,25 @@ fn finite(out: &[Output]) -> bool {
         }
         _ => true,
     })
+}
+
+proptest! {
+    #[test]
+    fn bytes_from_anywhere_never_panic_and_are_answered_once(
+        bytes in proptest::collection::vec(any::<u8>(), 0..400), cut in 0usize..2000, flip in any::<u8>(),
+    ) {
+        let mut agent = Agent::new(AgentConfig::new("fleet", "d1"));
+        agent.step(Nanos(0), &[]);
+        let offer = encode(&plan(&[("d1", Vec3::zeros())])).expect("encodes");
+        let mut damaged = offer[..cut.min(offer.len())].to_vec();
+        if let Some(byte) = damaged.last_mut() {
+            *byte ^= flip;
+        }
+        for bytes in [bytes, damaged] {
+            let out = agent.step(Nanos(1), &[Input::Ground { bytes: bytes.clone() }, Input::Peer { bytes }]);
+            prop_assert_eq!(out.len(), 1);
+        }
+    }
 }
 
 proptest! {

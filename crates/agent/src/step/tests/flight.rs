@@ -91,7 +91,7 @@ fn a_splice_does_not_jump() {
 
 #[test]
 fn without_replanning_a_gust_of_one_second_peaks_between_eta_and_one_metre() {
-    let mut rig = Rig::new(0.45, super::rig::plan(&[("d1", Vec3::new(1.0, 2.0, 0.1))]));
+    let mut rig = Rig::new(0.45, super::plans::plan(&[("d1", Vec3::new(1.0, 2.0, 0.1))]));
     rig.plan.replan.enabled = false;
     rig.run(2.5);
     rig.commit();

@@ -3,4 +3,5 @@
 mod admission;
 mod failures;
 mod flight;
+pub mod plans;
 mod rig;
