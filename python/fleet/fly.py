@@ -15,7 +15,7 @@ from fleet.endpoint import Endpoint
 from fleet.faults import environment
 from fleet.files import PlanFile, write_atomic
 from fleet.interrupt import Interrupt
-from fleet.landing import Desk, bring_down, follow
+from fleet.landing import Desk, KilledError, bring_down, follow
 from fleet.processes import Child, Children, find_program
 from fleet.router import ensure, retire
 from fleet.rundir import RunDir
@@ -99,6 +99,8 @@ def fly(
                 programs.sim.tell({"t0_unix_ns": started.t0_unix_ns})
             horizon = mission.plan["horizon"]
             end = follow(link, watch, started, horizon, programs, desk)
+        except KilledError:
+            raise
         except BaseException:
             bring_down(link, watch, programs, desk)
             raise

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import zenoh
 
 IDLE_S = 10.0
-"""A router started by `fleet fly` ends when no agent has been connected for this long [s]."""
+"""A router started by `fleet fly` ends when neither agent nor ground has been connected for this long [s]."""
 READY_S = 10.0
 _POLL_S = 0.25
 _GONE_S = 1.0
@@ -49,7 +49,7 @@ def serve(
     on_ready: Callable[[], None],
     exit_when_idle: float | None = None,
 ) -> None:
-    """Route until a signal comes, or until no agent has been connected for ``exit_when_idle`` [s].
+    """Route until a signal comes, or until nobody has been connected for ``exit_when_idle`` [s].
 
     Raises:
         EnvironmentError_: when the port cannot be had.
@@ -71,7 +71,7 @@ def serve(
             if exit_when_idle is None:
                 continue
             now = time.monotonic()
-            if any(reply.ok is not None for reply in session.liveliness().get(ALIVE_KEYS, timeout=1.0)):
+            if session.info.transports():
                 idle_since = now
             elif now - idle_since > exit_when_idle:
                 return
@@ -91,7 +91,7 @@ def _taken(endpoint: Endpoint, why: str) -> EnvironmentError_:
 def ensure(endpoint: Endpoint, log: Path, interrupt: Interrupt) -> subprocess.Popen[bytes] | None:
     """Make sure that a router answers at ``endpoint``; the process, if one had to be started.
 
-    The process is detached: it outlives a command that dies, and ends by itself once no agent is connected.
+    The process is detached: it outlives a command that dies, and ends by itself once nobody is connected.
 
     Raises:
         EnvironmentError_: when something else holds the port, nothing answers at an address that is not of
@@ -143,9 +143,13 @@ def _wait_until_up(process: subprocess.Popen[bytes], endpoint: Endpoint, log: Pa
 def retire(process: subprocess.Popen[bytes], endpoint: Endpoint) -> bool:
     """End a router that this command started, unless agents still need it; whether it has ended."""
     if process.poll() is None:
-        with connect(endpoint) as session:
-            if _agents_stay(session):
-                return False
+        try:
+            with connect(endpoint) as session:
+                if _agents_stay(session):
+                    return False
+        except EnvironmentError_:
+            # Whom it does not answer any more, it cannot serve either: it is ended like an unused one.
+            pass
         process.terminate()
     try:
         process.wait(3.0)

@@ -90,7 +90,15 @@ class Double:
     def land(self) -> None:
         """Come down."""
         self.mode, self.armed = "idle", False
-        self._up({"kind": "event", "drone": self.drone, "mission_time": None, "what": {"event": "landed"}, "cause": ""})
+        self._up(
+            {
+                "kind": "event",
+                "drone": self.drone,
+                "mission_time": None,
+                "what": {"event": "landed"},
+                "cause": "",
+            }
+        )
 
     def _time(self, query: zenoh.Query) -> None:
         query.reply(query.key_expr, _core.encode_time({"now": self.now()}))
@@ -137,7 +145,13 @@ class Double:
 
     def _beat(self) -> None:
         while not self.stopped.wait(0.2):
-            beat = {"drone": self.drone, "now": self.now(), "mode": self.mode, "hash": "", "armed": self.armed}
+            beat = {
+                "drone": self.drone,
+                "now": self.now(),
+                "mode": self.mode,
+                "hash": "",
+                "armed": self.armed,
+            }
             rest = {"mission_time": None, "battery": None, "state_age": None}
             self._up({"kind": "heartbeat", **beat, **rest})
 

@@ -148,5 +148,7 @@ def test_what_is_not_a_router_is_refused(endpoint: str) -> None:
 
 
 def test_only_drones_of_the_fleet_are_seen(router: str) -> None:
-    with linked(router, Double(router, "d1"), Double(router, "d2"), Double(router, "x1", fleet="other")) as link:
+    with linked(
+        router, Double(router, "d1"), Double(router, "d2"), Double(router, "x1", fleet="other")
+    ) as link:
         assert link.drones() == ["d1", "d2"]

@@ -57,7 +57,7 @@ def router(
         bool, typer.Option("--insecure", help="Allow an address that is not loopback.")
     ] = False,
     exit_when_idle: Annotated[
-        float | None, typer.Option(help="End when no agent has been connected for this many seconds.")
+        float | None, typer.Option(help="End when nobody has been connected for this many seconds.")
     ] = None,
     as_json: Json = False,
 ) -> None:

@@ -89,9 +89,14 @@ class Link:
 
     def ask(self, drone: str, what: Literal["time", "status", "plan"]) -> bytes | None:
         """The drone's answer to a query, or None when it does not answer within 1 s."""
-        for reply in self.session.get(_core.key_query(self.fleet, drone, what), timeout=_QUERY_S):
-            if reply.ok is not None:
-                return bytes(reply.ok.payload)
+        import zenoh
+
+        try:
+            for reply in self.session.get(_core.key_query(self.fleet, drone, what), timeout=_QUERY_S):
+                if reply.ok is not None:
+                    return bytes(reply.ok.payload)
+        except zenoh.ZError as error:
+            raise _gone(error) from error
         return None
 
     def status(self, drone: str, within_s: float) -> dict[str, Any]:
@@ -152,11 +157,11 @@ class Link:
     def _put(self, message: Message) -> None:
         import zenoh
 
-        self.session.put(
-            _core.key_down(self.fleet, message.drone, message.channel),
-            message.payload,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-        )
+        key = _core.key_down(self.fleet, message.drone, message.channel)
+        try:
+            self.session.put(key, message.payload, congestion_control=zenoh.CongestionControl.BLOCK)
+        except zenoh.ZError as error:
+            raise _gone(error) from error
 
     def _settle(self, messages: list[Message]) -> list[Message]:
         """Messages that still wait for an answer; a refusal raises."""
@@ -199,6 +204,10 @@ class Link:
             # The first answer counts; a later one answers a copy of the message.
             self._acks.setdefault((body["drone"], body["epoch"], body["seq"]), body)
             self._changed.notify_all()
+
+
+def _gone(error: Exception) -> EnvironmentError_:
+    return environment("router", f"the link to the router is gone: {error}", field="--connect")
 
 
 def _poll(ask: Callable[[], bytes | None], within_s: float) -> bytes | None:

@@ -117,8 +117,11 @@ class Shipment:
         self._all(body, "the start command", within_s=LEAD_S - 10.5)
         return Started(self.mission_id, self.epoch, t0, now_unix + (t0 - now_mono))
 
-    def _all(self, body: Callable[[str], dict[str, Any]], what: str, *, within_s: float = ANSWER_S) -> None:
+    def _all(
+        self, body: Callable[[str], dict[str, Any]], what: str, *, within_s: float | None = None
+    ) -> None:
         self._seq += 1
+        within = ANSWER_S if within_s is None else within_s
         messages: list[Message] = [
             compose(
                 drone,
@@ -127,8 +130,8 @@ class Shipment:
                 epoch=self.epoch,
                 seq=self._seq,
                 offset=self._offsets[drone],
-                valid_s=within_s,
+                valid_s=within,
             )
             for drone in self.drones
         ]
-        self.link.request(messages, within_s=within_s, what=what)
+        self.link.request(messages, within_s=within, what=what)
