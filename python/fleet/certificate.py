@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet import _core
 
@@ -48,7 +49,7 @@ def prove(
 ) -> Proof:
     """Exact robustness at k T_s and the continuous-time lower bound of every clause, by the core."""
     fleet = _core.Fleet(list(drones), list(regions))
-    times = np.arange(round(horizon / sample) + 1) * sample
+    times = np.arange(round(horizon / sample) + 1).astype(np.float64) * sample
     positions = np.stack([np.ascontiguousarray(t.sample(times)[:, :3]) for t in tracks])
     found: dict[str, dict[str, float]] = {}
     for name, formula in clauses:
@@ -68,7 +69,7 @@ def verify(plan: bytes | Mapping[str, Any]) -> VerifyResult:
     `plan` is a plan file's bytes or its dict. ValueError when it is not a plan at all.
     """
     data = plan if isinstance(plan, bytes) else _core.encode_plan(plan)
-    content: dict[str, Any] = _core.decode_plan(data)
+    content: Mapping[str, Any] = _core.decode_plan(data)
     tracks = [_core.Trajectory.from_list(d["trajectory"]) for d in content["drones"]]
     ids = [d["id"] for d in content["drones"]]
     clauses = [(c["id"], c["formula"]) for c in content["clauses"]]
@@ -127,7 +128,7 @@ def flight(content: Mapping[str, Any], drone: Mapping[str, Any], track: _core.Tr
     return out + visits(content, drone, track)
 
 
-def heading_rate(knots: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+def heading_rate(knots: NDArray[np.float64]) -> float:
     """Largest |heading rate| [rad/s] on a grid of 16 points a segment, of knots (n, 13)."""
     track = _core.Trajectory(np.ascontiguousarray(knots))
     steps = np.linspace(0, 1, 16, endpoint=False)

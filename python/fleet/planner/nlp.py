@@ -14,6 +14,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from . import clearance as near
 from .convex import GIVEN_UP, SOFT, TOLERANCE, Margins, Steps, better
@@ -44,6 +45,7 @@ class Program:
     g: list[Any] = field(default_factory=list)
     g_low: list[Array] = field(default_factory=list)
     g_high: list[Array] = field(default_factory=list)
+    smoothed: bool = False
 
     def unknown(self, name: str, rows: int, columns: int, guess: Array, low: float, high: float) -> Any:
         """A matrix of unknowns within bounds."""
@@ -91,7 +93,7 @@ def control_points(x: Any, pieces: Pieces) -> list[Any]:
     return out
 
 
-def triplets(rows: Array, columns: Array, values: Array, shape: tuple[int, int]) -> Any:
+def triplets(rows: NDArray[Any], columns: NDArray[Any], values: Array, shape: tuple[int, int]) -> Any:
     """A CasADi sparse matrix; explicit zeros are kept."""
     return ca.DM.triplet([int(r) for r in rows], [int(c) for c in columns], ca.DM(values), *shape)
 
@@ -155,15 +157,17 @@ def pose_pairs(
     program.constrain(gap - ca.repmat(ca.DM(w.value + extra).T, 6, 1) - r, 0.0, np.inf)
 
 
-def pose_rest(program: Program, task: Problem, grid: Grid, x: Any, r: Any, c: Any) -> None:
+def pose_rest(program: Program, task: Problem, grid: Grid, x: Any, r: Any, parameters: Any) -> None:
     """Smooth robustness of every part without a normal form at least r."""
     if not task.spec.rest:
         return
-    times = np.arange(round(task.horizon / task.sample) + 1) * task.sample
+    times = np.arange(round(task.horizon / task.sample) + 1).astype(np.float64) * task.sample
     positions = {n: sampled(grid, x, d, times) for d, n in enumerate(task.ids)}
-    walk = Smooth(positions, task.regions, task.sample, c)
+    walk = Smooth(positions, task.regions, task.sample, parameters[2])
     for part in task.spec.rest:
-        program.constrain(walk.conjuncts(part.formula) - r, 0.0, np.inf)
+        column = walk.conjuncts(part.formula)
+        program.smoothed |= ca.depends_on(column, parameters)
+        program.constrain(column - r, 0.0, np.inf)
 
 
 def sampled(grid: Grid, x: Any, drone: int, times: Array) -> Any:
@@ -203,7 +207,7 @@ def build(steps: Steps, now: Array, margins: Margins, level: float) -> tuple[Pro
         pose_obstacles(program, w, x, r, now)
     for w in steps.apart:
         pose_pairs(program, w, x, r, now, task.tube, level)
-    pose_rest(program, task, grid, x, r, p[2])
+    pose_rest(program, task, grid, x, r, p)
     program.constrain(r - p[1], 0.0, np.inf)
     return program, -r + p[0] * cost, p
 
@@ -213,7 +217,7 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Arr
     task = steps.setup.problem
     program, objective, p = build(steps, now, margins, steps.setup.bound if hold is None else hold)
     statement = {"x": ca.vertcat(*program.unknowns), "f": objective, "g": ca.vertcat(*program.g), "p": p}
-    options = {
+    options: dict[str, Any] = {
         "ipopt": {
             "linear_solver": "mumps",
             "max_iter": task.max_iterations,
@@ -221,6 +225,8 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Arr
             "constr_viol_tol": 1e-7,
             "acceptable_iter": 0,
             "mu_strategy": "adaptive",
+            # Smooth robustness over many samples makes a dense and indefinite Hessian.
+            "hessian_approximation": "limited-memory" if task.spec.rest else "exact",
             "print_level": 0,
             "sb": "yes",
         },
@@ -228,7 +234,7 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Arr
     }
     solver = ca.nlpsol("plan", "ipopt", statement, options)
     guess = np.concatenate(program.guess)
-    for factor in SHARPER if task.spec.rest else (1.0,):
+    for factor in SHARPER if program.smoothed else (1.0,):
         weight = SOFT if hold is None else 1.0
         parameters = [weight, -1e3 if hold is None else hold, factor * task.c]
         found = solver(
@@ -259,7 +265,7 @@ def optimise(
         x, last = best, top
         for _ in range(ROUNDS):
             steps.rows(x, setup.bound if level is None else level)
-            found = solve(steps, x, last, level)
+            found = solve(steps, best, top, level)
             count += 1
             if found is None:
                 break

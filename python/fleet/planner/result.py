@@ -70,7 +70,7 @@ def trajectory(problem: Problem, itinerary: Itinerary, grid: Grid, x: Array, dro
     psi = headings(problem, itinerary, drone, times)
     rows = np.column_stack([times, knots.reshape(len(times), 9), psi])
     # Rounded far below any tolerance, so that the plan does not carry the noise of the last bits.
-    return _core.Trajectory(np.round(rows, 12) + 0.0)
+    return _core.Trajectory(np.round(rows, 12).astype(np.float64) + 0.0)
 
 
 def squared_acceleration(grid: Grid, x: Array) -> float:
@@ -195,7 +195,7 @@ def result(
         for s in stops
     ]
     return PlanResult(
-        plan=_core.decode_plan(data),
+        plan=dict(_core.decode_plan(data)),
         data=data,
         hash=_core.plan_hash(data),
         status=status,
