@@ -31,7 +31,9 @@ impl Agent {
         self.watch_state(now);
         self.watch_lift(now);
         self.watch_mode(now);
-        let handed_over = self.handing_over.is_some() && self.vehicle.mode == Some(VehicleMode::Land);
+        // Once handed over it stays so: PX4 shows OFFBOARD again as soon as it has disarmed (mavlink.md, 3).
+        let handed_over = self.handing_over.is_some()
+            && (self.vehicle.mode == Some(VehicleMode::Land) || matches!(self.path, Path::Ground));
         if handed_over {
             // From here on the autopilot follows nothing of ours.
             self.path = Path::Ground;
