@@ -50,22 +50,30 @@ def read_plan(path: Path) -> PlanFile:
     Raises:
         InputError: when it is missing, too large, or not a plan of this version.
     """
-    from fleet import _core
-
     kind(path)
     try:
         payload = path.read_bytes()
     except OSError as error:
         raise bad_input("file", f"cannot be read: {error.strerror}", file=str(path)) from error
     try:
-        plan = _core.decode_plan(payload)
+        return plan_of(payload)
     except ValueError as error:
         raise bad_input(
             "plan",
             f"is not a plan: {error}; legal is a file of `fleet plan -o`, or a scenario ending in .toml",
             file=str(path),
         ) from error
-    return PlanFile(plan, payload, _core.plan_hash(payload))
+
+
+def plan_of(payload: bytes) -> PlanFile:
+    """The plan in the bytes of a plan file.
+
+    Raises:
+        ValueError: when they are not a plan of this version.
+    """
+    from fleet import _core
+
+    return PlanFile(_core.decode_plan(payload), payload, _core.plan_hash(payload))
 
 
 def read_scenario(path: Path) -> Scenario:

@@ -175,7 +175,7 @@ def _mission(answer: Reply, path: Path) -> tuple[files.PlanFile, str]:
         scenario = files.read_scenario(path)
         answer.scenario, answer.seed = scenario.name, scenario.mission.seed
         made = make_plan(answer, scenario)
-        return files.PlanFile(made.plan, made.bytes, made.hash), world_config(scenario)
+        return files.plan_of(made.bytes), world_config(scenario)
     if files.kind(path) == "log":
         raise bad_input("plan", "is a flight log; legal is a scenario or a plan", file=str(path))
     plan = files.read_plan(path)
