@@ -28,6 +28,8 @@ Progress = Callable[[str, float], None]
 
 #: Sharpness of smooth robustness [1/m] as multiples of the mission's c, one solve each.
 SHARPER = (1.0, 4.0, 16.0)
+#: Distance of the samples of smooth robustness [s]; windows are rounded to them.
+GUIDE = 0.5
 #: Margins round a corner are measured on parts of a piece, up to this much too low [m].
 MEASURED = 5e-3
 #: Solves with further pieces posed, when a solution passes what was not posed.
@@ -158,12 +160,16 @@ def pose_pairs(
 
 
 def pose_rest(program: Program, task: Problem, grid: Grid, x: Any, r: Any, parameters: Any) -> None:
-    """Smooth robustness of every part without a normal form at least r."""
+    """Smooth robustness of every part without a normal form at least r, at samples `GUIDE` apart.
+
+    They guide the solver; the verdict is the exact robustness at T_s, which the result is certified on.
+    """
     if not task.spec.rest:
         return
-    times = np.arange(round(task.horizon / task.sample) + 1).astype(np.float64) * task.sample
+    step = max(1, round(GUIDE / task.sample)) * task.sample
+    times = np.arange(round(task.horizon / step) + 1).astype(np.float64) * step
     positions = {n: sampled(grid, x, d, times) for d, n in enumerate(task.ids)}
-    walk = Smooth(positions, task.regions, task.sample, parameters[2])
+    walk = Smooth(positions, task.regions, step, parameters[2])
     for part in task.spec.rest:
         column = walk.conjuncts(part.formula)
         program.smoothed |= ca.depends_on(column, parameters)
