@@ -110,9 +110,9 @@ def test_crossing_is_coupled():
 
 
 def test_gusts_are_about_four_metres_per_second_squared():
-    """design.md: about 3.9 m/s^2 x mass (1.5 kg) for 1 s, one on each drone."""
+    """design.md: about 3.9 m/s^2 x mass (1.7 kg) for 1 s, one on each drone."""
     loaded = scenario("power_tower_gust")
     assert [pulse.drone for pulse in loaded.disturbances] == ["d1", "d2"]
     for pulse in loaded.disturbances:
         assert pulse.duration == 1.0
-        assert 3.5 <= np.linalg.norm(pulse.force) / 1.5 <= 4.3
+        assert 3.5 <= np.linalg.norm(pulse.force) / 1.7 <= 4.3
