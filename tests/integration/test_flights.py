@@ -102,7 +102,7 @@ def test_a_changed_inbox_is_noticed(fleet: Run, tmp_path: Path) -> None:
 
     changed = tmp_path / "changed.mcap"
     with (tmp_path / result["log"]).open("rb") as source, changed.open("wb") as target:
-        writer = Writer(target)
+        writer = Writer(target, compression=CompressionType.LZ4)
         writer.start()
         channel = writer.register_channel("/d1/inbox", "cbor", 0)
         for index, (_, _, message) in enumerate(make_reader(source).iter_messages(topics=["/d1/inbox"])):
