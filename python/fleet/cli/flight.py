@@ -141,18 +141,22 @@ def report(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="HTML file; beside the log if not given.")
     ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="PNG", help="Also draw the flown paths as a picture.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write the report of a flight as one HTML file that needs no network.
 
     Example: fleet report runs/power_tower/flight.mcap
     """
-    with reply("report", as_json=as_json, keys=("log", "report", "verdict")) as answer:
+    with reply("report", as_json=as_json, keys=("log", "report", "verdict", "picture")) as answer:
         if files.kind(log) != "log":
             raise bad_input("log", "is not a flight log (MCAP)", file=str(log))
         path = output if output is not None else log.with_suffix(".html")
-        if not path.parent.is_dir():
-            raise bad_input("file", "the folder does not exist", file=str(path), field="--output")
+        for file, field in ((path, "--output"), (picture, "--picture")):
+            if file is not None and not file.parent.is_dir():
+                raise bad_input("file", "the folder does not exist", file=str(file), field=field)
         from fleet import report as writer
         from fleet.log import read
         from fleet.verdict import judge
@@ -162,6 +166,10 @@ def report(
             verdict = judge(flight)
             tell("writing")
             writer.write(flight, verdict, path)
+            if picture is not None:
+                tell("drawing")
+                writer.draw(flight, picture)
+                answer.fields["picture"] = str(picture)
         answer.scenario, answer.seed = flight.plan["scenario"], flight.plan["seed"]
         answer.fields |= {"log": str(log), "report": str(path), "verdict": show.word(verdict)}
         answer.say(f"report: {path}")
