@@ -36,11 +36,13 @@ class Interrupt:
         if threading.current_thread() is not threading.main_thread():
             yield
             return
-        before = [signal.signal(one, self._on_signal) for one in _SIGNALS]
+        # A signal that our parent has switched off stays off: `nohup fleet fly ...` outlives its terminal.
+        wanted = [one for one in _SIGNALS if signal.getsignal(one) is not signal.SIG_IGN]
+        before = [signal.signal(one, self._on_signal) for one in wanted]
         try:
             yield
         finally:
-            for one, handler in zip(_SIGNALS, before, strict=True):
+            for one, handler in zip(wanted, before, strict=True):
                 signal.signal(one, handler)
 
     @contextmanager

@@ -109,7 +109,11 @@ def bring_down(link: Link, watch: Watch, programs: Programs, desk: Desk) -> None
     """
     interrupt = desk.interrupt
     interrupt.count_only()
-    flying = [view for view in watch.views.values() if view.armed and not _is_down(view, programs)]
+    flying = [
+        view
+        for view in watch.views.values()
+        if view.armed and not _is_down(view, programs) and not _is_dead(view, programs)
+    ]
     if not flying or (programs.sim is not None and programs.sim.code() is not None):
         return
     seen = interrupt.count
@@ -154,6 +158,12 @@ def _is_down(view: DroneView, programs: Programs) -> bool:
     """Down by its own word, or because its agent, told to exit when landed, has done so."""
     agent = programs.agents.get(view.drone)
     return view.down or (agent is not None and agent.code() == 0 and view.was_armed)
+
+
+def _is_dead(view: DroneView, programs: Programs) -> bool:
+    """Whether its agent has ended: nobody can command it any more, its autopilot lands it by itself."""
+    agent = programs.agents.get(view.drone)
+    return agent is not None and agent.code() is not None
 
 
 def _check_programs(watch: Watch, programs: Programs) -> None:

@@ -1,5 +1,6 @@
 """Ctrl-C at every phase: what is kept, what is answered, and that no process and no port stays taken."""
 
+import os
 import signal
 import subprocess
 import threading
@@ -113,8 +114,7 @@ def test_armed_on_the_ground(tmp_path: Path, endpoint: str, nothing_left: None) 
 
 def test_once_in_the_air_lands_and_keeps_the_log(tmp_path: Path, endpoint: str, nothing_left: None) -> None:
     flight = Flight(tmp_path, endpoint)
-    flight.wait_for("armed -> takeoff")
-    time.sleep(3.0)
+    flight.wait_for("takeoff -> track")
     flight.interrupt()
     answer = flight.end(60.0)
     answer.assert_no_traceback()
@@ -128,12 +128,25 @@ def test_once_in_the_air_lands_and_keeps_the_log(tmp_path: Path, endpoint: str, 
 
 def test_twice_in_the_air_kills_the_simulation(tmp_path: Path, endpoint: str, nothing_left: None) -> None:
     flight = Flight(tmp_path, endpoint)
-    flight.wait_for("armed -> takeoff")
-    time.sleep(1.0)
+    flight.wait_for("takeoff -> track")
     flight.interrupt()
     time.sleep(0.5)
     flight.interrupt()
     assert_nothing_kept(flight.end(10.0), flight)
+
+
+def test_an_agent_that_dies_in_the_air(tmp_path: Path, endpoint: str, nothing_left: None) -> None:
+    flight = Flight(tmp_path, endpoint)
+    flight.wait_for("armed -> takeoff")
+    (agent,) = (
+        one for one in processes_with(str(tmp_path)) if "fleet-agent" in one and "fly" not in one.split()
+    )
+    os.kill(int(agent.split(":")[0]), signal.SIGKILL)
+    answer = flight.end(30.0)
+    answer.assert_no_traceback()
+    assert answer.code == 4, answer.err
+    assert "fleet-agent d1 ended in flight (exit code -9)" in answer.json["errors"][0]["message"]
+    assert (flight.run / "parts" / "sim.mcap").is_file()
 
 
 def test_a_dead_ground_station_leaves_a_fleet_that_others_command(
