@@ -265,7 +265,8 @@ def optimise(
     best = warm_start(setup) if start is None else start
     top, count = steps.margins(best), 0
     for hold in (False, True):
-        if hold and not usable(top):
+        # Quasi-Newton steps hardly get anywhere on energy; `SOFT` has kept the flight smooth already.
+        if hold and (not usable(top) or setup.problem.spec.rest):
             break
         level = top.r - GIVEN_UP if hold else None
         x, last = best, top
