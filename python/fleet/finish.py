@@ -26,30 +26,31 @@ class Finished:
 def finish(
     mission: PlanFile, parts: list[Path], t0_ns: int, run: RunDir, *, progress: Callable[[float, str], None]
 ) -> Finished:
-    """Merge ``parts``, judge the flight and write the report; ``t0_ns`` is mission time 0 on the log's clock.
+    """Judge the flight, merge ``parts`` with the verdict, and write the report.
 
-    The log is merged first without a verdict, judged as anybody would judge it, and then completed with it.
+    ``t0_ns`` is mission time 0 on the log's clock.
 
     Raises:
         LogError: when a part is missing or cannot be read.
     """
     from fleet import report
-    from fleet.log import Mission, merge, read
+    from fleet.log import Mission, assemble, merge
     from fleet.verdict import judge
 
     about = Mission(mission.payload, t0_ns)
-    merge(parts, run.log, about, progress=lambda done: progress(0.5 * done, "merging logs"))
-    progress(0.5, "judging")
-    verdict = judge(read(run.log))
+    progress(0.0, "reading logs")
+    flight = assemble(parts, run.log, about)
+    progress(0.3, "judging")
+    verdict = judge(flight)
     merge(
         parts,
         run.log,
         about,
         verdict=verdict.as_dict(),
-        progress=lambda done: progress(0.6 + 0.3 * done, "writing the verdict"),
+        progress=lambda done: progress(0.4 + 0.4 * done, "merging logs"),
     )
-    progress(0.9, "writing the report")
-    report.write(read(run.log), verdict, run.report)
+    progress(0.8, "writing the report")
+    report.write(flight, verdict, run.report)
     return Finished(run.log, run.report, verdict)
 
 

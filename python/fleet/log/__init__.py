@@ -1,6 +1,6 @@
 """Flight logs: one MCAP file a run, readable by Foxglove and by [read][fleet.log.read]."""
 
-from fleet.log.flight import DroneLog, Flight, read
-from fleet.log.merge import Mission, merge
+from fleet.log.flight import DroneLog, Flight, Mission, assemble, read
+from fleet.log.merge import merge
 
-__all__ = ["DroneLog", "Flight", "Mission", "merge", "read"]
+__all__ = ["DroneLog", "Flight", "Mission", "assemble", "merge", "read"]

@@ -6,6 +6,7 @@ import base64
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,14 @@ class DroneLog:
     replans: list[dict[str, Any]] = field(default_factory=list)
 
 
+@dataclass(frozen=True)
+class Mission:
+    """What was flown and when: the plan file's bytes, and mission time 0 on the log's clock [ns]."""
+
+    plan_bytes: bytes
+    t0_ns: int
+
+
 @dataclass
 class Flight:
     """A whole run: the plan that was flown and what each drone did."""
@@ -60,15 +69,25 @@ def read(path: Path) -> Flight:
         raise LogError(path, "holds no /mission message; is it one agent's own log, not a merged one?")
     mission = missions[-1]
     plan_bytes = base64.b64decode(mission["plan_cbor_base64"])
-    try:
-        plan = _core.decode_plan(plan_bytes)
-    except ValueError as error:
-        raise LogError(path, f"/mission holds a plan that cannot be read: {error}") from error
     found = _core.plan_hash(plan_bytes)
     if found != mission["hash"]:
         raise LogError(path, f"/mission names plan {mission['hash'][:12]} but holds {found[:12]}")
-    flight = Flight(path, plan, plan_bytes, found, int(mission["t0_ns"]), {}, [])
-    _fill(flight)
+    return assemble([path], path, Mission(plan_bytes, int(mission["t0_ns"])))
+
+
+def assemble(parts: list[Path], path: Path, mission: Mission) -> Flight:
+    """The flight that the logs of agents and simulator tell together; `path` is where they are merged to.
+
+    Raises `LogError` when a part or the plan cannot be read.
+    """
+    try:
+        plan = _core.decode_plan(mission.plan_bytes)
+    except ValueError as error:
+        raise LogError(path, f"the flown plan cannot be read: {error}") from error
+    flight = Flight(
+        path, plan, mission.plan_bytes, _core.plan_hash(mission.plan_bytes), mission.t0_ns, {}, []
+    )
+    _fill(flight, parts)
     return flight
 
 
@@ -90,14 +109,14 @@ def messages(path: Path, topics: list[str] | None = None) -> Iterator[tuple[str,
         raise LogError(path, f"is not a readable MCAP file ({error or type(error).__name__})") from error
 
 
-def _fill(flight: Flight) -> None:
+def _fill(flight: Flight, parts: list[Path]) -> None:
     ids = [drone["id"] for drone in flight.plan["drones"]]
     rows: dict[str, dict[str, list[list[float]]]] = {
         i: {"truth": [], "state": [], "reference": [], "setpoint": []} for i in ids
     }
     flight.drones = {i: DroneLog() for i in ids}
     wanted = [f"/{i}/{leaf}" for i in ids for leaf in (*rows[i], "mode", "replan")]
-    for topic, at, data in messages(flight.path, [*wanted, "/event"]):
+    for topic, at, data in chain.from_iterable(messages(part, [*wanted, "/event"]) for part in parts):
         t = (at - flight.t0_ns) * 1e-9
         body = json.loads(data)
         if topic == "/event":
@@ -116,6 +135,7 @@ def _fill(flight: Flight) -> None:
         for leaf, values in rows[i].items():
             if values:
                 setattr(flight.drones[i], leaf, np.asarray(values, dtype=float))
+    flight.events.sort(key=lambda event: event[0])
 
 
 def _pose(t: float, body: dict[str, Any]) -> list[float]:

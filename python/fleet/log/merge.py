@@ -9,7 +9,6 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +17,10 @@ import numpy as np
 from fleet import _core
 from fleet.errors import LogError
 from fleet.log import schemas
+from fleet.log.flight import Mission
 from fleet.log.scene import entity
 
 _PLAN_STEP = 0.25
-
-
-@dataclass(frozen=True)
-class Mission:
-    """What the merged log says of the mission: plan file's bytes and mission time 0 on the log's clock."""
-
-    plan_bytes: bytes
-    t0_ns: int
 
 
 def merge(
