@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.bench.table import ROOT, fleet, publish
 
-CASES = ("hover", "power_tower", "power_tower_4", "crossing")
+CASES = ("hover", "power_tower", "power_tower_4", "power_tower_solo", "crossing")
 REPEATS = 5
 
 
