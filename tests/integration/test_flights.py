@@ -112,3 +112,27 @@ def test_a_changed_inbox_is_noticed(fleet: Run, tmp_path: Path) -> None:
         writer.finish()
     command = [program("fleet-agent"), "replay", str(changed), "--drone", "d1"]
     assert subprocess.run(command, capture_output=True, check=False).returncode == 1
+
+
+def test_every_message_of_a_log_fits_its_schema(fleet: Run, tmp_path: Path) -> None:
+    from jsonschema import Draft202012Validator
+    from mcap.reader import make_reader
+
+    _, result = simulate(fleet, SCENARIOS / "power_tower_gust.toml")
+    checked: dict[str, int] = {}
+    validators: dict[int, Draft202012Validator] = {}
+    with (tmp_path / result["log"]).open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            if channel.message_encoding != "json":
+                continue
+            assert schema is not None, channel.topic
+            if schema.id not in validators:
+                Draft202012Validator.check_schema(json.loads(schema.data))
+                validators[schema.id] = Draft202012Validator(json.loads(schema.data))
+            # A hundred of each topic say as much as all thousands.
+            checked[channel.topic] = checked.get(channel.topic, 0) + 1
+            if checked[channel.topic] <= 100:
+                validators[schema.id].validate(json.loads(message.data))
+    leaves = {"plan", "state", "truth", "reference", "setpoint", "mode", "replan"}
+    wanted = {f"/{drone}/{leaf}" for drone in ("d1", "d2") for leaf in leaves}
+    assert wanted | {"/mission", "/event", "/verdict", "/scene"} <= set(checked)

@@ -20,7 +20,7 @@ SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 @pytest.fixture(scope="module")
 def planned() -> PlanResult:
-    return plan(load(SCENARIOS / "power_tower.toml"))
+    return plan(load(SCENARIOS / "crossing.toml"))
 
 
 @pytest.fixture(scope="module")
