@@ -9,11 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from tests.integration.conftest import SCENARIOS, Answer
 
 Run = Callable[..., Answer]
+Array = NDArray[np.float64]
 
 
 def simulate(fleet: Run, scenario: Path, run_dir: str = "run") -> tuple[Answer, dict[str, Any]]:
@@ -62,6 +65,43 @@ def test_gusts_trigger_replans_and_the_drones_rejoin(fleet: Run, tmp_path: Path)
         times = log.truth[(log.truth[:, 0] > max(rejoins) + 2.0) & (log.truth[:, 0] < 60.0), 0]
         away = positions_at(log.truth, times) - plan_positions(flight.plan, drone, times)
         assert float((away**2).sum(axis=1).max()) ** 0.5 < 0.3
+
+
+# What a tick of 10 ms may change, at a splice as anywhere in a gust: the acceleration that is asked for
+# [m/s^2], and body rates [rad/s] (the controller feeds jerk forward at no more than 60 m/s^4).
+ACCELERATION_STEP = 0.10
+RATE_STEP = 0.10
+
+
+def test_a_replan_is_spliced_without_a_jump(fleet: Run, tmp_path: Path) -> None:
+    from fleet.log import read
+
+    _, result = simulate(fleet, SCENARIOS / "power_tower_gust.toml")
+    flight = read(tmp_path / result["log"])
+    for drone, log in flight.drones.items():
+        splices = [n["t_splice"] for n in log.replans if n["outcome"] == "committed"]
+        assert splices
+        for splice in splices:
+            # The gust still pushes: the demand is far from rest and beyond the plan's own limit.
+            times, asked = asked_acceleration(log.state, log.reference, splice)
+            assert np.abs(asked).max() > flight.plan["limits"]["a_max"], drone
+            steps = np.linalg.norm(np.diff(asked, axis=0), axis=1)
+            assert steps.max() <= ACCELERATION_STEP, (drone, splice, times[int(steps.argmax())], steps.max())
+            near = np.abs(log.setpoint[:, 0] - splice) < 0.15
+            turns = np.abs(np.diff(log.setpoint[near, 1:4], axis=0)).max(axis=1)
+            assert turns.max() <= RATE_STEP, (drone, splice, turns.max())
+
+
+def asked_acceleration(state: Array, reference: Array, around: float) -> tuple[Array, Array]:
+    """The controller's demand from what was logged, 0.15 s around a moment: times and (n, 3) [m/s^2].
+
+    Lee 2010, equation 15 with the agent's default gains 4 and 3.6; the integral, which changes by less
+    than 0.003 m/s^2 in a tick, is left out.
+    """
+    state, reference = (rows[np.abs(rows[:, 0] - around) < 0.15] for rows in (state, reference))
+    assert np.allclose(state[:, 0], reference[:, 0], atol=1e-6)
+    away, drift = reference[:, 1:4] - state[:, 1:4], reference[:, 4:7] - state[:, 4:7]
+    return state[:, 0], reference[:, 11:14] + 4.0 * away + 3.6 * drift
 
 
 def test_gusts_are_sized_to_need_a_replan(fleet: Run, tmp_path: Path) -> None:

@@ -40,6 +40,11 @@ pub struct Gains {
     pub tilt_max: f64,
     /// Largest commanded acceleration per axis, before the tilt limit [m/s^2].
     pub acceleration_max: f64,
+    /// Fastest change of the jerk that is fed forward [m/s^4]. A reference is continuous in
+    /// acceleration only, at the splice of a replan above all; the body rates, jerk / g, would step
+    /// with its jerk. This spreads a step of the 20 m/s^3 that a replan may have over 0.3 s, at no
+    /// more than about 0.06 rad/s in a tick of 10 ms.
+    pub snap_max: f64,
 }
 
 impl Default for Gains {
@@ -57,6 +62,7 @@ impl Default for Gains {
             rate_max: 220f64.to_radians(),
             tilt_max: 45f64.to_radians(),
             acceleration_max: 6.0,
+            snap_max: 60.0,
         }
     }
 }
@@ -70,23 +76,26 @@ pub struct Demand {
     pub acceleration: Vec3,
 }
 
-/// Position and attitude control; its only memory is the position integral.
+/// Position and attitude control; its only memories are the position integral and the jerk that
+/// was fed forward last.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Controller {
     gains: Gains,
     integral: Vec3,
+    jerk: Vec3,
 }
 
 impl Controller {
     /// A controller at rest.
     #[must_use]
     pub fn new(gains: Gains) -> Self {
-        Self { gains, integral: Vec3::zeros() }
+        Self { gains, integral: Vec3::zeros(), jerk: Vec3::zeros() }
     }
 
-    /// Forgets the integral.
+    /// Forgets the integral and the jerk.
     pub fn reset(&mut self) {
         self.integral = Vec3::zeros();
+        self.jerk = Vec3::zeros();
     }
 
     /// Tracks `reference` from `state`; `hover_thrust` in (0, 1], `dt` since the last call [s].
@@ -107,10 +116,32 @@ impl Controller {
             let next = self.integral + error * (g.integral * dt.clamp(0.0, 0.1));
             self.integral = next.map(|x| x.clamp(-g.integral_max, g.integral_max));
         }
-        let pull = error.cap_magnitude(g.error_max) * g.position;
-        let damping = (reference.v - state.v) * g.velocity;
-        let acceleration = reference.a + pull + damping + self.integral;
-        self.steer(&state.q, acceleration, reference, hover_thrust)
+        self.jerk += (reference.j - self.jerk).cap_magnitude(g.snap_max * dt.clamp(0.0, 0.1));
+        let acceleration = self.feedback(&state.p, &state.v, reference) + self.integral;
+        let reference = Reference { j: self.jerk, ..*reference };
+        self.steer(&state.q, acceleration, &reference, hover_thrust)
+    }
+
+    /// Acceleration asked for at position `p` [m] and velocity `v` [m/s] without the integral
+    /// [m/s^2; ENU]: reference, pull and damping (Lee 2010, equation 15).
+    fn feedback(&self, p: &Vec3, v: &Vec3, reference: &Reference) -> Vec3 {
+        let pull = (reference.p - p).cap_magnitude(self.gains.error_max) * self.gains.position;
+        reference.a + pull + (reference.v - v) * self.gains.velocity
+    }
+
+    /// Acceleration [m/s^2; ENU] with which a new reference must begin at `p`, `v`, so that the
+    /// demand goes on from what `reference` makes it there. The integral adds the same to both; what
+    /// the new reference's own error adds is the same for both too while no limit acts.
+    #[must_use]
+    pub fn handover(&self, p: &Vec3, v: &Vec3, reference: &Reference) -> Vec3 {
+        limit_acceleration(self.feedback(p, v, reference) + self.integral, &self.gains) - self.integral
+    }
+
+    /// The part of a demanded acceleration that moves the vehicle: the integral only holds against
+    /// what pushes all the time [m/s^2; ENU].
+    #[must_use]
+    pub fn without_integral(&self, acceleration: &Vec3) -> Vec3 {
+        acceleration - self.integral
     }
 
     /// Points the thrust so that `acceleration` [m/s^2; ENU] results, with heading, heading rate and

@@ -46,7 +46,9 @@ fn feed_forward_alone_follows_a_trajectory_exactly() {
     for t in [0.0, 0.7, 2.2] {
         let r = at(t);
         let state = State { at: Nanos(0), p: r.p, v: r.v, q: pose(t), w: Vec3::zeros() };
-        let demand = update(&state, &r);
+        let mut controller = Controller::new(Gains::default());
+        controller.jerk = r.j;
+        let demand = controller.update(&state, &r, HOVER, 0.01).expect("finite input");
         let h = 1e-5;
         let w = (pose(t - h).inverse() * pose(t + h)).scaled_axis() / (2.0 * h);
         // Mellinger's yaw rate takes only the heading rate's share along z_B: within the tilt squared.
@@ -79,11 +81,48 @@ fn integral_winds_up_only_close_to_the_reference() {
     assert_eq!(far.integral, Vec3::zeros());
 }
 
+#[test]
+fn a_step_of_jerk_is_fed_forward_slowly_and_in_full() {
+    let state = hovering(heading(0.0));
+    let reference = Reference { j: Vec3::new(12.0, 16.0, 0.0), ..Reference::rest(state.p, 0.0) };
+    let mut controller = Controller::new(Gains::default());
+    let (mut last, mut rates) = (Vec3::zeros(), Vec3::zeros());
+    // 20 m/s^3 at 60 m/s^4 take a third of a second.
+    for tick in 0..40 {
+        rates = controller.update(&state, &reference, HOVER, 0.01).expect("finite input").setpoint.rates;
+        let step = (rates - last).norm() * GRAVITY;
+        assert!(step <= 0.6 + 1e-9, "tick {tick}: {step} m/s^3");
+        last = rates;
+    }
+    assert!((rates - Vec3::new(-16.0, 12.0, 0.0) / GRAVITY).norm() < 1e-9, "{rates}");
+}
+
 fn vector(limit: f64) -> impl Strategy<Value = Vec3> {
     [-limit..limit, -limit..limit, -limit..limit].prop_map(Vec3::from)
 }
 
 proptest! {
+    #[test]
+    fn a_handover_does_not_change_the_demand(
+        dp in vector(1.4), dv in vector(1.5), a in vector(2.0), wound in vector(1.0),
+        miss_p in vector(0.05), miss_v in vector(0.3),
+    ) {
+        // A new reference that begins where the vehicle was expected, while the vehicle is elsewhere.
+        let old = Reference { a, v: Vec3::new(1.0, -2.0, 0.5), ..Reference::rest(Vec3::new(1.0, 2.0, 3.0), 0.0) };
+        let mut controller = Controller::new(Gains::default());
+        controller.integral = wound;
+        let (p, v) = (old.p - dp, old.v - dv);
+        let new = Reference { p, v, a: controller.handover(&p, &v, &old), ..old };
+        let state = State { p: p + miss_p, v: v + miss_v, ..hovering(heading(0.0)) };
+        let free = controller.feedback(&state.p, &state.v, &old) + wound;
+        let expected = controller.feedback(&p, &v, &old) + wound;
+        let limited = |x: Vec3| (limit_acceleration(x, &controller.gains) - x).norm() > 0.0;
+        prop_assume!(dp.norm() < 1.5 && (old.p - state.p).norm() < 1.5 && !limited(free) && !limited(expected));
+        let demand = |r: &Reference| controller.clone().update(&state, r, HOVER, 0.01).expect("finite").acceleration;
+        // Only what one tick integrates differs.
+        prop_assert!((demand(&old) - demand(&new)).norm() < 0.8 * 1.5 * 0.01 + 1e-9);
+    }
+
     #[test]
     fn small_rotations_are_restored(axis in vector(1.0), angle in 0.01..0.4f64, psi in -3.0..3.0f64) {
         prop_assume!(axis.norm() > 0.1);

@@ -27,7 +27,8 @@ const SPACING: f64 = 0.2;
 const REJOIN_MIN: f64 = 1.0;
 /// Topic waypoints tried in one request.
 const CANDIDATES: usize = 3;
-/// Start and end of an answer may differ this much from what was asked [m]; solver tolerance.
+/// Start and end of an answer may differ this much from what was asked [m, m/s, m/s^2]; solver
+/// tolerance.
 const SEAM: f64 = 0.01;
 
 /// A request that is being solved.
@@ -119,8 +120,10 @@ impl Agent {
             return false;
         };
         let reference = self.reference(now.plus(lead)).unwrap_or(Reference::rest(state.p, self.heading(now)));
-        let a_max = plan.plan.limits.a_max;
-        let start = predict(&state, self.acceleration.map(|a| a.clamp(-a_max, a_max)), t, lead, &reference);
+        let mut start =
+            predict(&state, self.controller.without_integral(&self.acceleration), t, lead, &reference);
+        // The commanded acceleration must not step at the splice, however wrong the prediction is.
+        start.a = self.controller.handover(&start.p, &start.v, &reference);
         let rejoin = candidates(plan.own(), &start, plan.plan.limits.v_max);
         if rejoin.is_empty() {
             return false;
@@ -185,8 +188,10 @@ impl Agent {
         let in_time = (piece.start() - request.start.t).abs() < 1e-6 && (piece.end() - t_rejoin).abs() < 1e-6;
         let seams = (first.p - request.start.p).norm() < SEAM
             && (first.v - request.start.v).norm() < SEAM
+            && (first.a - request.start.a).norm() < SEAM
             && (last.p - fleet.p).norm() < SEAM
-            && (last.v - fleet.v).norm() < SEAM;
+            && (last.v - fleet.v).norm() < SEAM
+            && (last.a - fleet.a).norm() < SEAM;
         if in_time && seams { Ok(piece.clone()) } else { Err(refuse("the solver's trajectory does not fit")) }
     }
 

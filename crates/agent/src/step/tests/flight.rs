@@ -75,18 +75,22 @@ fn a_splice_does_not_jump() {
     let mut rig = tracking(3.0);
     rig.body.push = Vec3::new(0.0, 3.9, 0.0);
     rig.run_until(Mode::Replan, 1.0);
-    let (mut before, end) = (rig.agent.acceleration, rig.now.plus(0.2));
-    while rig.agent.mode == Mode::Replan && rig.now < end {
-        before = rig.agent.acceleration;
+    // From the request to well after the splice nothing steps more from tick to tick than a gust
+    // and 60 m/s^4 of jerk make it: the demand of 4 m/s^2 and more goes on beyond the plan's limit.
+    let (mut spliced, end) = (false, rig.now.plus(0.3));
+    while rig.now < end {
+        let (acceleration, setpoint) = (rig.agent.acceleration, rig.agent.last_setpoint.expect("flying"));
         rig.tick();
+        let step = (rig.agent.acceleration - acceleration).norm();
+        let turn = (rig.agent.last_setpoint.expect("flying").rates - setpoint.rates).norm();
+        assert!(step < 0.15 && turn < 0.12, "{step} m/s^2 and {turn} rad/s at {:?}", rig.now);
+        if !spliced && rig.agent.mode == Mode::Track {
+            spliced = true;
+            assert!(acceleration.amax() > rig.plan.limits.a_max, "{acceleration}");
+            assert!(rig.agent.deviation.expect("known") < 0.05, "{:?}", rig.agent.deviation);
+        }
     }
-    assert_eq!(rig.agent.mode, Mode::Track);
-    // Just after the splice the reference is where the vehicle is, and it is pushed on as before,
-    // as far as the plan's limit goes.
-    let a_max = rig.plan.limits.a_max;
-    assert!(rig.agent.deviation.expect("known") < 0.05, "{:?}", rig.agent.deviation);
-    let jump = (rig.agent.acceleration - before.map(|a| a.clamp(-a_max, a_max))).norm();
-    assert!(jump < 0.8, "from {before} to {}", rig.agent.acceleration);
+    assert!(spliced, "{:?}", rig.agent.mode);
 }
 
 #[test]
