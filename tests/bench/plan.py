@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.bench.table import ROOT, fleet, publish
 
-CASES = ("hover", "power_tower", "power_tower_4", "power_tower_solo", "crossing")
+CASES = ("hover", "power_tower", "power_tower_4", "power_tower_solo", "multi_line", "crossing")
 REPEATS = 5
 
 

@@ -17,7 +17,7 @@ from fleet.planner import PlanResult, Status, plan
 from fleet.scenario import load
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-NAMES = ("hover", "power_tower", "power_tower_4", "power_tower_solo", "crossing")
+NAMES = ("hover", "power_tower", "power_tower_4", "power_tower_solo", "multi_line", "crossing")
 
 
 @cache
