@@ -1,5 +1,6 @@
 """Text syntax of mission formulas: what it means, what it refuses, and that the printer undoes the parser."""
 
+import re
 from itertools import permutations
 
 import pytest
@@ -117,7 +118,7 @@ def test_meaning(text, formula):
         (60.0, "T-5,T", (55.0, 60.0)),
         (30.0, "0,T/2", (0.0, 15.0)),
         (60.0, "0.05,0.15", (0.05, 0.15)),
-        (60.0, "0.149,0.16", (0.1, 0.15)),
+        (10.01, "T/3,T/2", (3.3, 5.0)),
         (60.0, "(1+2)*3,-1+20", (9.0, 19.0)),
     ],
 )
@@ -125,6 +126,21 @@ def test_windows_are_rounded_down_to_samples(T, window, bounds):
     words = Vocabulary(DRONES, (), ("tr1",), T=T, T_s=0.05, delta_min=3.0)
     formula = one(f"eventually[{window}] d1 in tr1", words)
     assert (formula["from"], formula["to"]) == bounds
+
+
+@pytest.mark.parametrize(
+    ("window", "column", "words"),
+    [
+        ("0.149,0.2", 12, "0.149 s is not a multiple of T_s = 0.05 s; next to it are 0.1 and 0.15"),
+        ("3,3.02", 14, "3.02 s is not a multiple of T_s = 0.05 s; next to it are 3 and 3.05"),
+        ("0,10/3", 14, "is not a multiple of T_s"),
+    ],
+)
+def test_times_between_samples_are_refused(window, column, words):
+    vocabulary = Vocabulary(DRONES, (), ("tr1",), T=60.0, T_s=0.05, delta_min=3.0)
+    with pytest.raises(FormulaError, match=re.escape(words)) as caught:
+        one(f"eventually[{window}] d1 in tr1", vocabulary)
+    assert (caught.value.line, caught.value.column) == (1, column)
 
 
 def test_quantifiers_cannot_explode():

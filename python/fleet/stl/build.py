@@ -83,6 +83,7 @@ class Builder(Arithmetic):
                 raise self.error(
                     as_tree(child), "a window's end is a number, built from numbers, T and delta_min"
                 )
+            self._check_grid(as_tree(child), form.constant)
             bounds.append(form.constant)
         T = self.words.T
         if not 0 <= bounds[0] <= bounds[1] or math.isinf(bounds[1]):
@@ -93,6 +94,22 @@ class Builder(Arithmetic):
             around = f", inside windows that reach to {offset:g} s" if offset else ""
             raise self.error(node, f"the window ends at {end:g} s{around}; the mission ends at T = {T:g} s")
         return start, end
+
+    def _check_grid(self, node: Node, time: float) -> None:
+        """A time written as a number must be a sample: rounding it would judge another mission than is written.
+
+        Only shares of T are rounded, because 2T/3 can rarely be written as a multiple of T_s.
+        """
+        step = self.words.T_s
+        of_T = any(token == "T" for token in node.scan_values(lambda value: isinstance(value, Token)))
+        if of_T or not math.isfinite(time) or time < 0:
+            return
+        before = self.words.floor(time)
+        if time - before > 1e-6 * step:
+            legal = f"{before:g} and {before + step:g}"
+            raise self.error(
+                node, f"{time:g} s is not a multiple of T_s = {step:g} s; next to it are {legal}"
+            )
 
     # -- quantifiers ---------------------------------------------------------------------------
 
