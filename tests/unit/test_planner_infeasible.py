@@ -85,6 +85,15 @@ def test_turn_too_fast(tmp_path: Path) -> None:
     assert "deg" in str(error) or "needs" in str(error)
 
 
+def test_clause_without_normal_form_that_cannot_hold(tmp_path: Path) -> None:
+    """Target and home touch in a plane only, so that no point is inside both."""
+    formula = 'seed = 1\nformula = "@both eventually[0,T] (d1 in up and d1 in home)"'
+    error = refused(changed(tmp_path, "hover", ("seed = 1", formula)))
+    assert error.clause == "both"
+    rho = float(str(error).split("found is ")[1].split(" m")[0])
+    assert rho <= 0.0
+
+
 def test_unknown_method(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="legal are auto, convex and nlp"):
         plan(load(SCENARIOS / "hover.toml"), method="magic")

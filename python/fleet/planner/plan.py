@@ -62,6 +62,10 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
         energy = squared_acceleration(stage.grid, x)
         out = result(scenario, task, way, tracks, bound=bound, method=used, int_a2=energy, timings=timings)
         timings["certify"], mark = lap(mark, timings["certify"])
+        why = broken(out)
+        if why is not None:
+            refusal = refusal or why
+            continue
         return out
     assert refusal is not None, "there is always an attempt, or schedules raises"
     raise refusal
@@ -106,3 +110,16 @@ def refuse(task: Problem, margins: convex.Margins) -> InfeasibleError | None:
         text = f"the best margin found is {margins.tube + task.tube:.2f} m, and the tube asks for {asked}"
         return InfeasibleError(text, clause=margins.clause)
     return None
+
+
+def broken(found: PlanResult) -> InfeasibleError | None:
+    """Why a plan does not do although it keeps limits and margins: a clause of it is violated at the samples.
+
+    Clauses without a normal form are only guided by their smooth robustness; the exact one decides.
+    """
+    worst = min(found.plan["clauses"], key=lambda clause: clause["result"]["rho"])
+    rho = float(worst["result"]["rho"])
+    if rho > 0:
+        return None
+    text = f"the best robustness found is {rho:.2f} m, and the mission asks for more than 0"
+    return InfeasibleError(text, clause=worst["id"])
