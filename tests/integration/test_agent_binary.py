@@ -1,8 +1,6 @@
 """The agent binary as a process: its ready line, its answers over a real Zenoh router, its end."""
 
 import json
-import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -14,26 +12,8 @@ from typing import Any
 import pytest
 
 from fleet import _core
-
-ROOT = Path(__file__).parents[2]
-
-
-def binary(name: str) -> Path:
-    """The built program: in FLEET_BIN_DIR, in the build folder, or on the PATH, in this order."""
-    folders = [os.environ.get("FLEET_BIN_DIR", ""), str(ROOT / "target" / "release")]
-    for folder in filter(None, folders):
-        if (Path(folder) / name).is_file():
-            return Path(folder) / name
-    found = shutil.which(name)
-    if found is None:
-        pytest.fail(f"{name} is not built: cargo build --release")
-    return Path(found)
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])
+from fleet.processes import find_program
+from tests.integration.conftest import free_port
 
 
 def eventually(what: str, probe: Callable[[], Any], within: float = 20.0) -> Any:
@@ -51,7 +31,7 @@ class Agent:
     """One agent process; ended with the test."""
 
     def __init__(self, folder: Path, port: int, *flags: str, drone: str = "d1") -> None:
-        words = [str(binary("fleet-agent")), "--fleet", "testfleet", "--drone", drone]
+        words = [str(find_program("fleet-agent")), "--fleet", "testfleet", "--drone", drone]
         words += ["--zenoh", f"tcp/127.0.0.1:{port}", "--state-dir", str(folder / "state")]
         if "--mavlink" not in flags:
             words += ["--mavlink", "udpin:127.0.0.1:0"]
@@ -166,7 +146,7 @@ def cbor_array(data: bytes) -> bytes:
 
 
 def replay(log: Path, drone: str) -> int:
-    words = [str(binary("fleet-agent")), "replay", str(log), "--drone", drone]
+    words = [str(find_program("fleet-agent")), "replay", str(log), "--drone", drone]
     return subprocess.run(words, check=False, capture_output=True, timeout=60).returncode
 
 
@@ -193,7 +173,7 @@ def test_a_users_mistake_is_one_line(flags: list[str], code: int, words: str) ->
     base = ["--drone", "d1"] if "--drone" not in flags else []
     mavlink = ["--mavlink", "udpin:127.0.0.1:0"] if "--mavlink" not in flags else []
     run = subprocess.run(
-        [str(binary("fleet-agent")), *base, *mavlink, *flags],
+        [str(find_program("fleet-agent")), *base, *mavlink, *flags],
         check=False,
         capture_output=True,
         text=True,
@@ -208,7 +188,7 @@ def test_a_taken_port_is_an_environment_error() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         endpoint = f"udpin:127.0.0.1:{taken.getsockname()[1]}"
-        words = [str(binary("fleet-agent")), "--drone", "d1", "--mavlink", endpoint]
+        words = [str(find_program("fleet-agent")), "--drone", "d1", "--mavlink", endpoint]
         run = subprocess.run(words, check=False, capture_output=True, text=True, timeout=30)
     assert run.returncode == 4
     assert endpoint in run.stderr

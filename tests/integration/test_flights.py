@@ -1,10 +1,7 @@
 """The shipped missions in virtual time: the real agent, autopilot and plant, judged on ground truth."""
 
 import json
-import os
-import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fleet.processes import find_program
 from tests.integration.conftest import SCENARIOS, Answer
 
 Run = Callable[..., Answer]
@@ -23,14 +21,6 @@ def simulate(fleet: Run, scenario: Path, run_dir: str = "run") -> tuple[Answer, 
     answer = fleet("simulate", str(scenario), "--run-dir", run_dir, "--json", within=240.0)
     answer.assert_no_traceback()
     return answer, answer.json
-
-
-def program(name: str) -> str:
-    """A binary of this build, beside the interpreter or where the build put it."""
-    folders = [os.environ.get("FLEET_BIN_DIR", ""), str(Path(sys.executable).parent)]
-    found = shutil.which(name, path=os.pathsep.join(filter(None, folders)))
-    assert found is not None, f"{name} is not installed; run make setup"
-    return found
 
 
 @pytest.mark.parametrize("name", ["hover", "power_tower", "power_tower_4", "crossing"])
@@ -129,7 +119,7 @@ def test_a_recorded_inbox_replays_to_the_same_outbox(fleet: Run, tmp_path: Path)
     _, result = simulate(fleet, SCENARIOS / "crossing.toml")
     log = tmp_path / result["log"]
     for drone in ("d1", "d2"):
-        command = [program("fleet-agent"), "replay", str(log), "--drone", drone]
+        command = [str(find_program("fleet-agent")), "replay", str(log), "--drone", drone]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout)["equal"] is True
@@ -150,7 +140,7 @@ def test_a_changed_inbox_is_noticed(fleet: Run, tmp_path: Path) -> None:
             data = message.data if index != 500 else message.data[:-1] + bytes([message.data[-1] ^ 1])
             writer.add_message(channel, message.log_time, data, message.publish_time)
         writer.finish()
-    command = [program("fleet-agent"), "replay", str(changed), "--drone", "d1"]
+    command = [str(find_program("fleet-agent")), "replay", str(changed), "--drone", "d1"]
     assert subprocess.run(command, capture_output=True, check=False).returncode == 1
 
 
