@@ -43,7 +43,7 @@ def assert_satisfied(answer: Answer, folder: Path) -> None:
     for drone in found["drones"]:
         assert set(drone) >= DRONE
         assert drone["end"] == "landed"
-        # Issue 3: calm flights track to 0.10 m RMSE and 0.30 m at most.
+        # Calm flights track to 0.10 m RMSE and 0.30 m at most.
         assert drone["rmse_m"] <= 0.10
         assert drone["max_m"] <= 0.30
     assert (folder / found["log"]).is_file()
@@ -74,7 +74,7 @@ def test_a_flight_in_virtual_time_is_the_same_twice(fleet: Fleet, tmp_path: Path
     answers = [fleet("simulate", HOVER, "--run-dir", name, "--json") for name in ("a", "b")]
     for answer in answers:
         assert_satisfied(answer, tmp_path)
-        # Issue 3: at least 50 times real time for two drones.
+        # At least 50 times real time for two drones.
         assert answer.json["sim_s"] > 50 * answer.json["wall_s"]
     logs = [tmp_path / name / "parts" / "virtual.mcap" for name in ("a", "b")]
     assert logs[0].read_bytes() == logs[1].read_bytes()
