@@ -74,8 +74,6 @@ def test_a_flight_in_virtual_time_is_the_same_twice(fleet: Fleet, tmp_path: Path
     answers = [fleet("simulate", HOVER, "--run-dir", name, "--json") for name in ("a", "b")]
     for answer in answers:
         assert_satisfied(answer, tmp_path)
-        # At least 50 times real time for two drones.
-        assert answer.json["sim_s"] > 50 * answer.json["wall_s"]
     logs = [tmp_path / name / "parts" / "virtual.mcap" for name in ("a", "b")]
     assert logs[0].read_bytes() == logs[1].read_bytes()
     assert answers[0].json["rho_flown"] == answers[1].json["rho_flown"]
