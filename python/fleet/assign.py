@@ -12,8 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 #: Largest number of events that is assigned exactly.
 EXACT = 12
@@ -96,11 +99,50 @@ def partition(options: Sequence[dict[int, float]], full: int) -> list[int] | Non
 def assign(legs: Legs) -> list[tuple[int, ...]] | None:
     """Events of every drone in order; None when no assignment meets the windows.
 
-    Exact up to `EXACT` events; above that cheapest insertion, which may miss a feasible assignment.
+    Exact up to `EXACT` events. Larger problems fall into the groups of drones and events that finite
+    legs connect; each group is exact on its own (least makespan of the group) up to `EXACT` events, and
+    assigned by cheapest insertion, which may miss a feasible assignment, above that.
     """
     drones, n = legs.first.shape
-    if n > EXACT:
-        return insert(legs)
+    if n <= EXACT:
+        return exact(legs)
+    orders: list[tuple[int, ...]] = [() for _ in range(drones)]
+    served = 0
+    for who, events in components(legs):
+        part = Legs(
+            legs.first[np.ix_(who, events)],
+            legs.between[np.ix_(who, events, events)],
+            legs.last[np.ix_(who, events)],
+            legs.idle[who],
+            legs.windows[events],
+            legs.dwell[events],
+            legs.horizon,
+        )
+        found = exact(part) if len(events) <= EXACT else insert(part)
+        if found is None:
+            return None
+        for d, order in zip(who, found, strict=True):
+            orders[d] = tuple(int(events[e]) for e in order)
+        served += len(events)
+    return orders if served == n else None
+
+
+def components(legs: Legs) -> list[tuple[Ints, Ints]]:
+    """Drones and events that finite legs from the start or between events connect, group by group."""
+    drones, n = legs.first.shape
+    linked = np.zeros((drones + n, drones + n), dtype=bool)
+    linked[:drones, drones:] = np.isfinite(legs.first)
+    linked[drones:, drones:] = np.isfinite(legs.between).any(axis=0)
+    count, label = connected_components(sparse.csr_matrix(linked), directed=False)
+    groups = [
+        (np.flatnonzero(label[:drones] == k), np.flatnonzero(label[drones:] == k)) for k in range(count)
+    ]
+    return [(who, events) for who, events in groups if len(who)]
+
+
+def exact(legs: Legs) -> list[tuple[int, ...]] | None:
+    """The assignment of least makespan, then least total time."""
+    drones, n = legs.first.shape
     table = [tours(legs, d) for d in range(drones)]
     masks = partition([{m: t for m, (t, _) in options.items()} for options in table], (1 << n) - 1)
     return None if masks is None else [table[d][m][1] for d, m in enumerate(masks)]
@@ -125,10 +167,10 @@ def insert(legs: Legs) -> list[tuple[int, ...]] | None:
     for e in sorted(range(n), key=lambda k: (float(legs.windows[k, 1]), -float(legs.first[:, k].min()), k)):
         best: tuple[float, float, int, tuple[int, ...]] | None = None
         for d in range(drones):
+            others = max((times[k] for k in range(drones) if k != d), default=0.0)
             for place in range(len(orders[d]) + 1):
                 order = (*orders[d][:place], e, *orders[d][place:])
                 t = tour_time(legs, d, order)
-                others = max((times[k] for k in range(drones) if k != d), default=0.0)
                 trial = (max(t, others), t - times[d], d, order)
                 if np.isfinite(t) and (best is None or trial < best):
                     best = trial

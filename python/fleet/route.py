@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 #: Distance between graph points on an edge [m]; it costs at most about 1 % of length at this scale.
 SPACING = 1.5
+#: Segments that are looked at together: bounds memory.
+CHUNK = 200_000
 #: A point nearer to a face than this counts as on it [m].
 TOUCH = 1e-6
 
@@ -58,6 +60,22 @@ def inflated(faces: Array, margin: float) -> Array:
     return np.column_stack([faces[:, :3], faces[:, 3] + margin])
 
 
+def cropped(faces: Array, low: Array, high: Array) -> Array:
+    """Faces of the part of a polyhedron inside the box from `low` to `high` (3,) [m]."""
+    one = np.eye(3)
+    return np.vstack([faces, np.column_stack([one, high]), np.column_stack([-one, -low])])
+
+
+def touching(obstacles: Sequence[Array], low: Array, high: Array) -> list[Array]:
+    """The obstacles whose bounding boxes touch the box from `low` to `high` (3,) [m]."""
+    corners = [vertices(faces)[0] for faces in obstacles]
+    return [
+        faces
+        for faces, c in zip(obstacles, corners, strict=True)
+        if (c.min(axis=0) <= high).all() and (c.max(axis=0) >= low).all()
+    ]
+
+
 def blocked(a: Array, b: Array, faces: Array) -> NDArray[np.bool_]:
     """Which segments a -> b (m, 3) cross the interior of the polyhedron (Cyrus-Beck clipping)."""
     start = a @ faces[:, :3].T - faces[:, 3]
@@ -83,14 +101,29 @@ class Network:
 
 def visibility(nodes: Array, obstacles: Sequence[Array]) -> sparse.csr_matrix:
     """Distances between all pairs of nodes (n, 3) that see each other."""
-    i, j = np.triu_indices(len(nodes), 1)
+    i, j = (index.astype(np.int32) for index in np.triu_indices(len(nodes), 1))
     clear = np.ones(len(i), dtype=bool)
-    for faces in obstacles:
-        left = np.flatnonzero(clear)
-        clear[left] = ~blocked(nodes[i[left]], nodes[j[left]], faces)
+    for begin in range(0, len(i), CHUNK):
+        part = slice(begin, begin + CHUNK)
+        clear[part] = unblocked(nodes[i[part]], nodes[j[part]], obstacles)
     i, j = i[clear], j[clear]
     length = np.maximum(np.linalg.norm(nodes[i] - nodes[j], axis=1), 1e-9)
     return sparse.csr_matrix((length, (i, j)), shape=(len(nodes), len(nodes)))
+
+
+def unblocked(a: Array, b: Array, obstacles: Sequence[Array]) -> NDArray[np.bool_]:
+    """Which segments a -> b (m, 3) cross no obstacle; only those whose boxes touch are looked at closely."""
+    clear = np.ones(len(a), dtype=bool)
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    for faces in obstacles:
+        corners, _ = vertices(faces)
+        touch = clear.copy()
+        for axis in range(3):
+            touch &= low[:, axis] <= corners[:, axis].max()
+            touch &= high[:, axis] >= corners[:, axis].min()
+        close = np.flatnonzero(touch)
+        clear[close] = ~blocked(a[close], b[close], faces)
+    return clear
 
 
 def network(points: Array, workspace: Array, obstacles: Sequence[Array], margin: float) -> Network:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
-from fleet.assign import Legs, assign
+from fleet.assign import EXACT, Legs, assign
 from fleet.errors import InfeasibleError
-from fleet.route import Network, leg_time, network, reach, spread, turn_time
+from fleet.route import Network, cropped, leg_time, network, reach, spread, touching, turn_time
 
-from .knots import Array
+from .knots import Array, Ints
 from .problem import Problem
 from .spec import Visit
 
@@ -22,6 +24,11 @@ EASE = (1.4, 1.15, 1.0)
 SPARE = 0.04
 #: Shares of the wanted clearance at which routes are sought, the widest first; never less than the tube.
 CLEARANCE = (1.0, 0.8, 0.6, 0.4, 0.0)
+
+#: Places within this time at v_max of each other are near, where a fleet is too large to route all legs [s].
+NEARBY = 7.0
+#: Room for detours around a group of near places [m].
+DETOUR = 10.0
 
 
 @dataclass(frozen=True)
@@ -57,26 +64,73 @@ class Map:
     place: tuple[tuple[int, ...], ...]
 
 
-def survey(problem: Problem, bound: float) -> Map:
-    """Ways between all places at the widest clearance, at least the tube, that connects all visits."""
+def survey(problem: Problem, bound: float, *, local: bool = False) -> Map:
+    """Ways between all places at the widest clearance, at least the tube, that connects all visits.
+
+    With `local` there are ways within groups of places near each other only (`neighbourhoods`).
+    """
     n = len(problem.ids)
     regions = sorted({r for v in problem.spec.visits for _, r in v.options} | set(problem.homes))
     points = np.vstack([problem.starts, *(problem.centers[r][None] for r in regions)])
     number = {r: n + k for k, r in enumerate(regions)}
-    place = tuple(
-        tuple(next((number[r] for d, r in v.options if d == name), -1) for v in problem.spec.visits)
-        for name in problem.ids
-    )
+    options = [dict(v.options) for v in problem.spec.visits]
+    place = tuple(tuple(number[o[name]] if name in o else -1 for o in options) for name in problem.ids)
     home = tuple(number[r] for r in problem.homes)
     names = (*(f"start of {d}" for d in problem.ids), *regions)
+    if local:
+        paths: dict[tuple[int, int], Array] = {}
+        for members in neighbourhoods(problem, points, home, number):
+            paths |= routes(problem, points, members, place, home, bound).paths
+        return Map(Network(paths), points, names, tuple(range(n)), home, place)
+    ways = routes(problem, points, None, place, home, bound)
+    return Map(ways, points, names, tuple(range(n)), home, place)
+
+
+def routes(
+    problem: Problem,
+    points: Array,
+    members: Ints | None,
+    place: tuple[tuple[int, ...], ...],
+    home: tuple[int, ...],
+    bound: float,
+) -> Network:
+    """Ways between all points, or between those of `members` past the obstacles around them."""
+    room = problem.regions[problem.workspace]
     obstacles = [problem.regions[o] for o in problem.obstacles]
-    needed = {(d, p) for d in range(n) for p in (*place[d], home[d]) if p >= 0}
+    chosen = np.arange(len(points)) if members is None else members
+    if members is not None:
+        low, high = points[members].min(axis=0) - DETOUR, points[members].max(axis=0) + DETOUR
+        room, obstacles = cropped(room, low, high), touching(obstacles, low, high)
+    inside = {int(p): k for k, p in enumerate(chosen)}
+    drones = [d for d in range(len(problem.ids)) if d in inside]
+    needed = {(inside[d], inside[p]) for d in drones for p in (*place[d], home[d]) if p in inside}
     for share in CLEARANCE:
-        margin = max(share * bound, problem.tube)
-        ways = network(points, problem.regions[problem.workspace], obstacles, margin)
+        ways = network(points[chosen], room, obstacles, max(share * bound, problem.tube))
         if all(ways.path(d, p) is not None for d, p in needed):
             break
-    return Map(ways, points, names, tuple(range(n)), home, place)
+    return Network({(int(chosen[i]), int(chosen[j])): path for (i, j), path in ways.paths.items()})
+
+
+def neighbourhoods(
+    problem: Problem, points: Array, home: tuple[int, ...], number: Mapping[str, int]
+) -> list[Ints]:
+    """Groups of places, joined where near each other; a drone is with its home and given targets.
+
+    A group without a drone joins the nearest one that has some.
+    """
+    n = len(problem.ids)
+    gap = np.linalg.norm(points[:, None] - points[None], axis=2)
+    joined = gap <= NEARBY * problem.v_max
+    joined[np.arange(n), list(home)] = True
+    for name, order in (problem.given or {}).items():
+        for region in order:
+            joined[problem.number(name), number[region]] = True
+    count, label = connected_components(sparse.csr_matrix(joined), directed=False)
+    for k in range(count):
+        mine = np.flatnonzero(label == k)
+        if len(mine) and mine.min() >= n:
+            label[mine] = label[gap[mine][:, :n].min(axis=0).argmin()]
+    return [np.flatnonzero(label == k) for k in np.unique(label)]
 
 
 def heading_at(problem: Problem, name: str, drone: int) -> float | None:
@@ -84,15 +138,19 @@ def heading_at(problem: Problem, name: str, drone: int) -> float | None:
     return float(problem.psi[drone]) if name.startswith("start of ") else problem.headings.get(name)
 
 
-def between(problem: Problem, world: Map, drone: int, i: int, j: int, ease: float | None) -> float:
-    """Least time [s] of a leg from place i to j: flight and turn; `ease` None flies through at v_max."""
-    path = world.ways.path(i, j) if i >= 0 and j >= 0 else None
-    if path is None:
-        return np.inf
-    flight = leg_time(reach(path), problem.v_max, problem.a_max, rest=ease is not None) * (ease or 1.0)
-    a, b = (heading_at(problem, world.names[k], drone) for k in (i, j))
-    turn = 0.0 if a is None or b is None else turn_time(shortest_turn(a, b), problem.heading_rate)
-    return max(flight, turn)
+def place_times(problem: Problem, world: Map, ease: float | None) -> Array:
+    """Least time [s] from place i to j: flight and turn; `ease` None flies through at v_max.
+
+    Infinite where there is no way. Numbers of the first places are those of the drones that start there.
+    """
+    out = np.full((len(world.points), len(world.points)), np.inf)
+    headings = [heading_at(problem, name, k) for k, name in enumerate(world.names)]
+    for (i, j), path in world.ways.paths.items():
+        flight = leg_time(reach(path), problem.v_max, problem.a_max, rest=ease is not None) * (ease or 1.0)
+        a, b = headings[i], headings[j]
+        turn = 0.0 if a is None or b is None else turn_time(shortest_turn(a, b), problem.heading_rate)
+        out[i, j] = max(flight, turn)
+    return out
 
 
 def shortest_turn(a: float, b: float) -> float:
@@ -107,17 +165,16 @@ def leg_times(problem: Problem, world: Map, ease: float | None) -> Legs:
     drones, n = len(problem.ids), len(visits)
     first, last = np.full((drones, n), np.inf), np.full((drones, n), np.inf)
     middle = np.full((drones, n, n), np.inf)
+    times = place_times(problem, world, ease)
     for d in range(drones):
-        places = world.place[d]
-        for e in range(n):
-            if places[e] < 0 or not permitted(problem, d, visits[e]):
-                continue
-            first[d, e] = between(problem, world, d, world.start[d], places[e], ease)
-            last[d, e] = between(problem, world, d, places[e], world.home[d], ease)
-            for f in range(n):
-                if f != e and places[f] >= 0:
-                    middle[d, e, f] = between(problem, world, d, places[e], places[f], ease)
-    idle = np.array([between(problem, world, d, world.start[d], world.home[d], ease) for d in range(drones)])
+        places = np.array(world.place[d], dtype=int)
+        mine = np.array([e for e in range(n) if places[e] >= 0 and permitted(problem, d, visits[e])], int)
+        there = np.flatnonzero(places >= 0)
+        first[d, mine] = times[world.start[d], places[mine]]
+        last[d, mine] = times[places[mine], world.home[d]]
+        middle[d][np.ix_(mine, there)] = times[np.ix_(places[mine], places[there])]
+        middle[d, mine, mine] = np.inf
+    idle = times[list(world.start), list(world.home)]
     windows = np.array([v.window for v in visits], dtype=float).reshape(n, 2)
     dwell = np.array([v.dwell for v in visits])
     return Legs(first, middle, last, idle, windows, dwell, problem.horizon)
@@ -153,7 +210,20 @@ def schedules(problem: Problem, bound: float) -> Iterator[Itinerary]:
     that hold over a part of the mission only. Raises InfeasibleError, naming the clause, when even
     flight through at v_max misses a window.
     """
+    if len(problem.spec.visits) > EXACT:
+        found = list(timed_itineraries(problem, survey(problem, bound, local=True)))
+        if found:
+            yield from found
+            return
     world = survey(problem, bound)
+    found = list(timed_itineraries(problem, world))
+    if not found:
+        raise unreachable(problem, world)
+    yield from found
+
+
+def timed_itineraries(problem: Problem, world: Map) -> Iterator[Itinerary]:
+    """The itineraries of `schedules` over the ways of `world`; none when a window would be missed."""
     for ease in (*EASE, None):
         legs = leg_times(problem, world, ease)
         orders = assign(legs)
@@ -168,7 +238,6 @@ def schedules(problem: Problem, bound: float) -> Iterator[Itinerary]:
                 shifted = [extreme_times(problem, legs, d, order, late) for d, order in enumerate(orders)]
                 yield itinerary(problem, world, orders, shifted)
             return
-    raise unreachable(problem, world)
 
 
 def event_times(problem: Problem, legs: Legs, drone: int, order: tuple[int, ...]) -> Array | None:
