@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,10 @@ from fleet.rundir import RunDir
 
 if TYPE_CHECKING:
     from fleet.verdict import Verdict
+
+
+CLOSE_S = 15.0
+"""Longest wait for a part of the log to be closed by the process that writes it [s]."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +39,14 @@ def finish(
         LogError: when a part is missing or cannot be read.
     """
     from fleet import report
-    from fleet.log import Mission, assemble, merge
+    from fleet.log import Mission, assemble, is_complete, merge
     from fleet.verdict import judge
+
+    # An agent that was running before the flight closes its log in its own time.
+    deadline = time.monotonic() + CLOSE_S
+    while not all(is_complete(part) for part in parts) and time.monotonic() < deadline:
+        progress(0.0, "waiting for logs to be closed")
+        time.sleep(0.1)
 
     about = Mission(mission.payload, t0_ns)
     progress(0.0, "reading logs")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import chain
@@ -17,6 +18,7 @@ from fleet import _core
 from fleet.errors import LogError
 
 Array = NDArray[np.float64]
+_MAGIC = b"\x89MCAP0\r\n"
 _POSE_COLUMNS = 14
 _SETPOINT_COLUMNS = 7
 
@@ -89,6 +91,16 @@ def assemble(parts: list[Path], path: Path, mission: Mission) -> Flight:
     )
     _fill(flight, parts)
     return flight
+
+
+def is_complete(path: Path) -> bool:
+    """Whether a log has its closing magic bytes (MCAP specification, File structure), or is not there."""
+    if not path.exists():
+        return True
+    with path.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(0, size - len(_MAGIC)))
+        return stream.read() == _MAGIC and size > len(_MAGIC)
 
 
 def messages(path: Path, topics: list[str] | None = None) -> Iterator[tuple[str, int, bytes]]:

@@ -96,7 +96,7 @@ class Builder(Arithmetic):
         return start, end
 
     def _check_grid(self, node: Node, time: float) -> None:
-        """A time written as a number must be a sample: rounding it would judge another mission than is written.
+        """A time written as a number must be a sample: rounding would judge another mission than is written.
 
         Only shares of T are rounded, because 2T/3 can rarely be written as a multiple of T_s.
         """
