@@ -20,6 +20,35 @@ use std::time::Duration;
 
 const SYSTEM: u8 = 33;
 
+#[test]
+fn a_log_that_lost_steps_is_told_how_many() {
+    let clock = Clock::start();
+    let (wake, woken) = Queue::bounded("wake", 256);
+    let link = VehicleLink::open("udpin:127.0.0.1:0".parse().unwrap()).unwrap();
+    let (comms, _comms) = Queue::bounded("comms", 4096);
+    let (solver, _solver) = Queue::bounded("solver", 4);
+    let (disk, _disk) = Queue::bounded("disk", 4);
+    let (record, steps) = Queue::bounded("record", 2);
+    let control = spawn("control", move || {
+        let outboxes = Outboxes { comms, solver, disk, record: Some(record) };
+        let agent = Agent::new(AgentConfig::new("fleet", "d1"));
+        Control::new(agent, Codec::new(SYSTEM, SYSTEM), clock, link, outboxes).run(&woken, false);
+    })
+    .unwrap();
+    // Two steps fit; nobody reads for as long as some ticks take.
+    std::thread::sleep(Duration::from_millis(200));
+    let (first, second) = (steps.recv().unwrap(), steps.recv().unwrap());
+    let third = steps.recv_timeout(Duration::from_secs(10)).unwrap();
+    assert_eq!((first.lost, second.lost), (0, 0));
+    assert!(third.lost >= 1);
+    let between = third.now.since(second.now);
+    assert!(third.lost as f64 <= between / 0.009, "{} in {between} s", third.lost);
+    wake.offer(Wake::Signal).unwrap();
+    // The thread sees that nobody reads any more and ends by the signal all the same.
+    drop(steps);
+    control.join().unwrap();
+}
+
 struct Running {
     address: SocketAddr,
     wake: Queue<Wake>,

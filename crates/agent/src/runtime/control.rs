@@ -59,13 +59,24 @@ pub struct Control {
     outboxes: Outboxes,
     watch: Watch,
     prepared: String,
+    /// Steps that the log has lost since the last one it took.
+    unrecorded: u64,
 }
 
 impl Control {
     /// Ready to [`Control::run`].
     #[must_use]
     pub fn new(agent: Agent, codec: Codec, clock: Clock, link: VehicleLink, outboxes: Outboxes) -> Self {
-        Self { agent, codec, clock, link, outboxes, watch: Watch::default(), prepared: String::new() }
+        Self {
+            agent,
+            codec,
+            clock,
+            link,
+            outboxes,
+            watch: Watch::default(),
+            prepared: String::new(),
+            unrecorded: 0,
+        }
     }
 
     /// Flies until a signal on the ground, or until landed if `exit_when_landed`.
@@ -112,8 +123,9 @@ impl Control {
     fn finish(&mut self, now: Nanos, inbox: Vec<Input>, outputs: Vec<Output>) -> Vec<Input> {
         let answers = self.dispatch(now, &outputs);
         if let Some(record) = &self.outboxes.record {
-            // The queue counts what it drops.
-            let _ = record.offer(Step { now, inbox, outputs });
+            // What the log lost is noted in it with the next step that fits.
+            let step = Step { now, inbox, outputs, lost: self.unrecorded };
+            self.unrecorded = if record.offer(step).is_ok() { 0 } else { self.unrecorded + 1 };
         }
         answers
     }

@@ -5,8 +5,12 @@ use super::spawn;
 use super::{RuntimeError, queue::Queue};
 use crate::AgentConfig;
 use crate::io::{Input, Output};
-use crate::record::{InboxError, Recorder, StepRecord, record_config, record_outputs, record_step};
+use crate::record::{
+    EventMessage, InboxError, RecordError, Recorder, SchemaName, StepRecord, record_config, record_outputs,
+    record_step,
+};
 use fleet_core::types::Nanos;
+use fleet_core::wire::{Event, EventKind};
 use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::thread::JoinHandle;
@@ -25,6 +29,8 @@ pub struct Step {
     pub inbox: Vec<Input>,
     /// What came out.
     pub outputs: Vec<Output>,
+    /// Steps before this one that found the queue full and are missing from the log.
+    pub lost: u64,
 }
 
 /// Creates the log and starts its thread, which ends when the queue's last sender is gone.
@@ -71,9 +77,24 @@ fn run(mut recorder: Recorder, drone: &str, clock: Clock, steps: &Receiver<Step>
 }
 
 fn write(recorder: &mut Recorder, drone: &str, clock: Clock, step: Step) -> Result<(), InboxError> {
-    let Step { now, inbox, outputs } = step;
+    let Step { now, inbox, outputs, lost } = step;
     let at_ns = clock.unix(now);
+    if lost > 0 {
+        record_loss(recorder, drone, at_ns, lost)?;
+    }
     record_outputs(recorder, drone, now, at_ns, &outputs)?;
     let record = StepRecord::new(now, inbox, &outputs)?;
     record_step(recorder, drone, at_ns, &record)
+}
+
+/// A log with a hole says so where the hole is: what comes after it does not replay.
+fn record_loss(recorder: &mut Recorder, drone: &str, at_ns: u64, lost: u64) -> Result<(), RecordError> {
+    tracing::error!(lost, "the disk was too slow: steps are missing from the log");
+    let event = Event {
+        drone: drone.to_owned(),
+        mission_time: None,
+        kind: EventKind::Fault { text: format!("{lost} steps before this moment are missing from the log") },
+        cause: "the disk was too slow".to_owned(),
+    };
+    recorder.json("/event", SchemaName::Event, at_ns, &EventMessage::new(at_ns, drone, &event))
 }

@@ -73,6 +73,10 @@ impl Agent {
                 self.fire(now, trigger, "commanded");
             }
         }
+        // A session that only knows how to stop the fleet must not make the mission's own stale.
+        if safer && (envelope.mission_id != self.mission.id() || envelope.epoch != self.mission.epoch) {
+            return Ok(());
+        }
         self.mission.accept(envelope.epoch, envelope.seq);
         self.mission.last_command = Some((envelope.epoch, envelope.seq, command.clone()));
         Ok(())

@@ -96,7 +96,12 @@ impl Agent {
             }
             Mode::Land => self.enter_land(now),
             Mode::Abort => self.path = Path::Sink { psi: self.heading(now) },
-            Mode::Released => self.path = Path::Ground,
+            Mode::Released => {
+                self.path = Path::Ground;
+                // A landing that a pilot broke off is over: a later one begins anew.
+                self.handing_over = None;
+                self.regaining = None;
+            }
         }
     }
 

@@ -10,6 +10,9 @@ use std::collections::BTreeMap;
 const JUMP: f64 = 0.3;
 /// Samples further apart than this say nothing about a jump [s].
 const JUMP_GAP: f64 = 0.2;
+/// A sample up to this much older than the newest was overtaken on the way and says nothing new [s];
+/// one that is older still comes from an autopilot that has started again.
+const OVERTAKEN: f64 = 1.0;
 /// A position or speed beyond this is not believed [m, m/s].
 const SANE: f64 = 1e5;
 
@@ -35,6 +38,8 @@ pub struct Flow {
 pub struct Vehicle {
     attitude: Option<(Nanos, Quat, Vec3)>,
     position: Option<(Nanos, Vec3, Vec3)>,
+    /// The autopilot's own time of that position [ms since its boot].
+    position_boot: u32,
     /// Scenario position minus local position [m; ENU].
     pub offset: Vec3,
     /// Pad for which the horizontal offset was taken.
@@ -82,10 +87,10 @@ impl Vehicle {
                     self.attitude = Some((now, UnitQuaternion::new_normalize(q.into_inner()), *w));
                 }
             }
-            VehicleMsg::LocalPosition { p, v, .. } => {
+            VehicleMsg::LocalPosition { boot_ms, p, v } => {
                 self.count(Stream::LocalPosition, now);
                 if finite(p) && finite(v) {
-                    return self.take_position(now, *p, *v);
+                    return self.take_position(now, *boot_ms, *p, *v);
                 }
             }
             VehicleMsg::Odometry { reset_counter } => {
@@ -117,13 +122,18 @@ impl Vehicle {
         None
     }
 
-    fn take_position(&mut self, now: Nanos, p: Vec3, v: Vec3) -> Option<Jump> {
+    /// Between two samples the autopilot's own clock counts: after a stall of the link or of this
+    /// process old samples arrive in one burst, and by their arrival all of them would be jumps.
+    fn take_position(&mut self, now: Nanos, boot_ms: u32, p: Vec3, v: Vec3) -> Option<Jump> {
         let mut jump = None;
-        if let Some((at, p0, v0)) = self.position {
-            let dt = now.since(at);
+        if let Some((_, p0, v0)) = self.position {
+            let dt = f64::from(boot_ms.wrapping_sub(self.position_boot).cast_signed()) * 1e-3;
+            if (-OVERTAKEN..0.0).contains(&dt) {
+                return None;
+            }
             let expected = p0 + (v0 + v) * (0.5 * dt);
             let metres = (p - expected).norm();
-            if dt < JUMP_GAP && metres > JUMP && self.armed {
+            if (0.0..JUMP_GAP).contains(&dt) && metres > JUMP && self.armed {
                 // The vehicle did not move: keep the scenario position where it was.
                 self.offset -= p - expected;
                 self.jumped_at = Some(now);
@@ -131,6 +141,7 @@ impl Vehicle {
             }
         }
         self.position = Some((now, p, v));
+        self.position_boot = boot_ms;
         jump
     }
 
@@ -225,8 +236,8 @@ impl Vehicle {
 mod tests {
     use super::*;
 
-    fn position(x: f64, vx: f64) -> VehicleMsg {
-        VehicleMsg::LocalPosition { boot_ms: 0, p: Vec3::new(x, 0.0, 1.0), v: Vec3::new(vx, 0.0, 0.0) }
+    fn position(boot_ms: u32, x: f64, vx: f64) -> VehicleMsg {
+        VehicleMsg::LocalPosition { boot_ms, p: Vec3::new(x, 0.0, 1.0), v: Vec3::new(vx, 0.0, 0.0) }
     }
 
     fn level() -> VehicleMsg {
@@ -238,26 +249,47 @@ mod tests {
         let mut vehicle = Vehicle { armed: true, ..Vehicle::default() };
         let at = |k: u64| Nanos(k * 10_000_000);
         vehicle.take(at(0), &level());
-        vehicle.take(at(0), &position(0.0, 1.0));
-        assert_eq!(vehicle.take(at(1), &position(0.01, 1.0)), None);
-        let jump = vehicle.take(at(2), &position(2.02, 1.0)).expect("a jump");
+        vehicle.take(at(0), &position(0, 0.0, 1.0));
+        assert_eq!(vehicle.take(at(1), &position(10, 0.01, 1.0)), None);
+        let jump = vehicle.take(at(2), &position(20, 2.02, 1.0)).expect("a jump");
         assert!((jump.metres - 2.0).abs() < 1e-9);
         assert!((vehicle.state(at(2)).expect("state").p.x - 0.02).abs() < 1e-9);
         assert_eq!(vehicle.take(at(2), &VehicleMsg::Odometry { reset_counter: 0 }), None);
         assert_eq!(vehicle.take(at(3), &VehicleMsg::Odometry { reset_counter: 1 }), None);
-        assert_eq!(vehicle.take(at(3), &position(2.03, 1.0)), None);
+        assert_eq!(vehicle.take(at(3), &position(30, 2.03, 1.0)), None);
         let later = vehicle.take(at(90), &VehicleMsg::Odometry { reset_counter: 2 });
         assert_eq!(later, Some(Jump { metres: 0.0 }));
+    }
+
+    #[test]
+    fn a_burst_of_old_samples_after_a_stall_is_no_jump() {
+        let mut vehicle = Vehicle { armed: true, ..Vehicle::default() };
+        vehicle.take(Nanos(0), &level());
+        vehicle.take(Nanos(0), &position(1000, 0.0, 5.0));
+        // 150 ms of samples at 5 m/s arrive in one millisecond; the first is 140 ms old by then.
+        for k in 1..=15_u32 {
+            let now = Nanos(150_000_000 + u64::from(k) * 60_000);
+            assert_eq!(vehicle.take(now, &position(1000 + 10 * k, 0.05 * f64::from(k), 5.0)), None, "{k}");
+        }
+        // One that was overtaken does not turn the position back.
+        assert_eq!(vehicle.take(Nanos(151_000_000), &position(1100, 0.5, 5.0)), None);
+        assert_eq!(vehicle.offset, Vec3::zeros());
+        assert!((vehicle.local().expect("known").x - 0.75).abs() < 1e-12);
+        // The autopilot's clock wraps after 49 days.
+        let mut late = Vehicle { armed: true, ..Vehicle::default() };
+        late.take(Nanos(0), &position(u32::MAX - 4, 0.0, 5.0));
+        assert_eq!(late.take(Nanos(10_000_000), &position(5, 0.05, 5.0)), None);
+        assert!(late.take(Nanos(20_000_000), &position(15, 1.1, 5.0)).is_some());
     }
 
     #[test]
     fn what_is_not_finite_reads_as_stale() {
         let mut vehicle = Vehicle::default();
         vehicle.take(Nanos(0), &level());
-        vehicle.take(Nanos(0), &position(0.0, 0.0));
+        vehicle.take(Nanos(0), &position(0, 0.0, 0.0));
         let now = Nanos(500_000_000);
-        vehicle.take(now, &position(f64::NAN, 0.0));
-        vehicle.take(now, &position(0.0, f64::INFINITY));
+        vehicle.take(now, &position(500, f64::NAN, 0.0));
+        vehicle.take(now, &position(500, 0.0, f64::INFINITY));
         assert_eq!(vehicle.age(now), Some(0.5));
         assert_eq!(vehicle.state(now).expect("state").p.x, 0.0);
     }
@@ -267,11 +299,11 @@ mod tests {
         let pad = Vec3::new(-5.0, -7.0, 0.2);
         let mut vehicle = Vehicle::default();
         vehicle.take(Nanos(0), &level());
-        vehicle.take(Nanos(0), &position(0.1, 0.0));
+        vehicle.take(Nanos(0), &position(0, 0.1, 0.0));
         vehicle.zero_on_pad(pad);
         assert!((vehicle.state(Nanos(0)).expect("state").p - pad).norm() < 1e-12);
         vehicle.keep_offset_of(pad);
-        vehicle.take(Nanos(1), &position(0.4, 0.0));
+        vehicle.take(Nanos(1), &position(10, 0.4, 0.0));
         vehicle.zero_on_pad(pad);
         let p = vehicle.state(Nanos(1)).expect("state").p;
         assert!((p - pad - Vec3::new(0.3, 0.0, 0.0)).norm() < 1e-12);

@@ -169,3 +169,16 @@ fn a_repeated_command_is_answered_again_and_done_once() {
     assert_eq!(rig.send(&envelope), AckResult::Accepted);
     assert_eq!(rig.send(&envelope), AckResult::Accepted);
 }
+
+#[test]
+fn a_stranger_may_stop_the_fleet_but_not_make_its_mission_stale() {
+    let mut rig = Rig::started(0.45, 12.0);
+    rig.run_until(Mode::Track, 13.0);
+    rig.run(2.0);
+    let mut envelope = rig.envelope(Down::Command(Command::Hold));
+    (envelope.mission_id, envelope.epoch, envelope.seq) = ("f".repeat(32), 99, u64::MAX);
+    assert_eq!(rig.send(&envelope), AckResult::Accepted);
+    assert_eq!(rig.agent.mode, Mode::Hold);
+    assert_eq!(rig.command(Command::Resume), AckResult::Accepted);
+    rig.run_until(Mode::Track, 1.0);
+}

@@ -2,7 +2,7 @@
 
 use super::rig::{Rig, code};
 use crate::io::{VehicleMode, VehicleMsg};
-use fleet_core::types::Vec3;
+use fleet_core::types::{Quat, Vec3};
 use fleet_core::wire::{AckResult, Command, EventKind, Mode, RejectCode, ReplanOutcome, Up};
 
 fn tracking(seconds: f64) -> Rig {
@@ -223,4 +223,33 @@ fn a_pilot_who_takes_over_is_left_alone_until_resume() {
     rig.run(4.0);
     assert_eq!((rig.agent.mode, rig.body.mode), (Mode::Hold, VehicleMode::Offboard));
     assert!(rig.body.v.norm() < 0.05);
+}
+
+#[test]
+fn a_landing_that_a_pilot_broke_off_begins_anew_after_resume() {
+    let mut rig = tracking(10.0);
+    assert_eq!(rig.command(Command::Land), AckResult::Accepted);
+    while rig.body.mode != VehicleMode::Land {
+        rig.tick();
+        assert!(rig.agent.mode == Mode::Land, "{:?}", rig.agent.mode);
+    }
+    // Just before touchdown the pilot climbs away.
+    rig.body.mode = VehicleMode::Other(3);
+    rig.vehicle(VehicleMsg::Mode { actual: VehicleMode::Other(3), intended: VehicleMode::Other(3) });
+    rig.tick();
+    assert_eq!(rig.agent.mode, Mode::Released);
+    (rig.body.setpoint.rates, rig.body.setpoint.thrust) = (Vec3::zeros(), rig.body.hover);
+    rig.body.q = Quat::identity();
+    rig.body.v = Vec3::new(0.0, 0.0, 3.0);
+    rig.run(1.5);
+    rig.body.v = Vec3::zeros();
+    rig.run(0.5);
+    assert_eq!(rig.command(Command::Resume), AckResult::Accepted);
+    rig.run(3.0);
+    assert_eq!((rig.agent.mode, rig.body.mode), (Mode::Hold, VehicleMode::Offboard));
+    assert_eq!(rig.command(Command::Land), AckResult::Accepted);
+    rig.run(1.0);
+    assert_eq!(rig.body.mode, VehicleMode::Offboard, "far from the ground it descends on our rates");
+    rig.run_until(Mode::Idle, 40.0);
+    assert!(!rig.body.armed);
 }
