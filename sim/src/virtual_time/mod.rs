@@ -11,7 +11,7 @@ use crate::world::{End, STEP, World, WorldConfig};
 use fleet_agent::record::{InboxError, MissionMessage, RecordError, Recorder, SchemaName};
 use fleet_core::replan::ReplanError;
 use fleet_core::types::Nanos;
-use fleet_core::wire::{DecodeError, Plan};
+use fleet_core::wire::{DecodeError, Plan, Status, Up};
 use ground::Ground;
 use onboard::Onboard;
 use std::collections::BTreeMap;
@@ -117,6 +117,11 @@ impl VirtualFlight {
         &self.world
     }
 
+    /// The world, for a test that acts on it as a pilot would.
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
     /// Mission time [s], once the start is known.
     #[must_use]
     pub fn mission_time(&self) -> Option<f64> {
@@ -149,11 +154,11 @@ impl VirtualFlight {
         })
     }
 
-    /// One period of the physics and whatever is due in it.
+    /// One period of the physics and whatever is due in it; gives what the drones published.
     ///
     /// # Errors
     /// When a drone refuses or the log cannot be written.
-    pub fn step(&mut self, mut recorder: Option<&mut Recorder>) -> Result<(), VirtualError> {
+    pub fn step(&mut self, mut recorder: Option<&mut Recorder>) -> Result<Vec<Up>, VirtualError> {
         let now = self.clock();
         if let Some(recorder) = recorder.as_deref_mut() {
             log::record_truth(recorder, &self.world, now.0)?;
@@ -161,10 +166,12 @@ impl VirtualFlight {
         for (onboard, vehicle) in self.onboard.iter_mut().zip(self.world.vehicles_mut()) {
             onboard.exchange(now, vehicle);
         }
+        let mut heard = Vec::new();
         for i in 0..self.onboard.len() {
             let published = self.onboard[i].step(now, recorder.as_deref_mut())?;
-            for bytes in published {
-                self.share(now, i, &bytes);
+            for message in published {
+                self.share(now, i, &message);
+                heard.push(message.message);
             }
         }
         self.run_ground(now, recorder.as_deref_mut())?;
@@ -173,7 +180,27 @@ impl VirtualFlight {
                 log::record_crash(recorder, &crash, crash.at.0 + EPOCH)?;
             }
         }
-        Ok(())
+        Ok(heard)
+    }
+
+    /// Another ground session's message for `drone`: an envelope, as it comes over the wire. False
+    /// when there is no such drone.
+    pub fn send(&mut self, drone: &str, envelope: Vec<u8>) -> bool {
+        let now = self.clock();
+        let onboard = self.onboard.iter_mut().find(|onboard| onboard.id() == drone);
+        onboard.map(|onboard| onboard.post_ground(now, envelope)).is_some()
+    }
+
+    /// What the drone answers to the `status` query; none before it has any.
+    #[must_use]
+    pub fn status(&self, drone: &str) -> Option<&Status> {
+        self.onboard.iter().find(|onboard| onboard.id() == drone)?.status()
+    }
+
+    /// The agents' clock.
+    #[must_use]
+    pub fn now(&self) -> Nanos {
+        self.clock()
     }
 
     fn clock(&self) -> Nanos {
@@ -209,7 +236,9 @@ impl VirtualFlight {
         Ok(())
     }
 
-    fn is_over(&self) -> bool {
+    /// Whether every drone is down again, or far too late.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
         let now = self.world.now();
         let Some(t) = self.mission_time() else { return false };
         let settled = self.world.vehicles().iter().all(|v| v.disarmed_for(now) >= SETTLED);

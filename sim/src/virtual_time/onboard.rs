@@ -23,7 +23,7 @@ const SERIAL: u64 = 1_000_000;
 const RADIO: u64 = 5_000_000;
 /// What a solve takes [ns] (design.md, Principles 1).
 const SOLVE: u64 = 20_000_000;
-/// The agent is the autopilot's only client.
+/// The agent's link; answers to other clients are not for it.
 const LINK: LinkId = LinkId(0);
 
 /// A message that a drone published.
@@ -74,6 +74,11 @@ impl Onboard {
         }
     }
 
+    /// Drone id.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
     /// The newest answer to the `status` query.
     pub fn status(&self) -> Option<&Status> {
         self.status.as_ref()
@@ -98,7 +103,8 @@ impl Onboard {
     /// the agent's clock; only the vehicle's own stamps tell them apart.
     pub fn exchange(&mut self, now: Nanos, vehicle: &mut Vehicle) {
         let launched = Nanos(now.0 - super::EPOCH);
-        for outgoing in vehicle.autopilot_mut().take_outgoing() {
+        let outgoing = vehicle.autopilot_mut().take_outgoing();
+        for outgoing in outgoing.into_iter().filter(|outgoing| outgoing.link == LINK) {
             self.from_vehicle.post(now, self.encoder.encode(&outgoing));
         }
         while let Some(bytes) = self.to_vehicle.take(now) {

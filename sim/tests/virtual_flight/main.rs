@@ -7,6 +7,7 @@
     reason = "a test reads its logs and prints how fast it was"
 )]
 
+mod commands;
 mod plan;
 
 use fleet_agent::record::{Recorder, replay};

@@ -141,6 +141,11 @@ impl Agent {
     fn watch_mode(&mut self, now: Nanos) {
         if self.mode != Mode::Idle && !self.vehicle.armed {
             self.fire(now, Trigger::Disarmed, "the autopilot disarmed");
+            if self.mode == Mode::Abort && self.lifted {
+                // Abort is latched, but the flight is over: now disarm may leave it.
+                self.lifted = false;
+                self.event(now, EventKind::Landed, "disarmed in mode Abort");
+            }
             return;
         }
         let ours = match self.vehicle.mode {

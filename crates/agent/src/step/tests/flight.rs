@@ -191,6 +191,9 @@ fn abort_in_the_air_comes_down_and_is_latched() {
     assert!(!rig.body.armed);
     assert_eq!(rig.agent.mode, Mode::Abort);
     assert_eq!(code(rig.command(Command::Arm)), RejectCode::Mode);
+    assert_eq!(rig.command(Command::Disarm), AckResult::Accepted);
+    assert_eq!(rig.agent.mode, Mode::Idle);
+    assert_eq!(rig.events().filter(|e| e.kind == EventKind::Landed).count(), 1);
 }
 
 #[test]
