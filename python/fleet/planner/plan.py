@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 from fleet.errors import InfeasibleError
 
-from . import convex
+from . import convex, groups
 from .ceiling import rho_bound
-from .knots import Array
 from .problem import Problem, problem
-from .result import PlanResult, result, squared_acceleration, trajectory
+from .result import PlanResult, result
 from .schedule import Itinerary, schedules
-from .setup import Setup, setup
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
 
 Progress = Callable[[str, float], None]
 
+#: Planning methods by name.
+METHODS: dict[str, groups.Method] = {"convex": groups.steps, "nlp": groups.nonlinear}
 #: Clearance that is worth while when no clause bounds rho [m].
 WIDEST = 5.0
 
@@ -48,18 +48,17 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     timings["route"], mark = lap(mark, timings["route"])
     refusal: InfeasibleError | None = None
     for way, used in attempts(task, ways, method):
-        stage = setup(task, way, min(bound, WIDEST))
         tell("build", bound)
-        timings["build"], mark = lap(mark, timings["build"])
-        x, margins = optimise(stage, used, progress)
-        timings["solve"], mark = lap(mark, timings["solve"])
+        flight = groups.fly(task, way, min(bound, WIDEST), METHODS[used], progress)
+        timings["build"] += flight.build_s
+        timings["solve"], mark = lap(mark, timings["solve"] - flight.build_s)
+        margins = flight.margins
         why = refuse(task, margins)
         if why is not None:
             refusal = refusal or why
             continue
         tell("certify", margins.r)
-        tracks = [trajectory(task, way, stage.grid, x, d) for d in range(len(task.ids))]
-        energy = squared_acceleration(stage.grid, x)
+        energy, tracks = flight.int_a2, flight.tracks
         out = result(scenario, task, way, tracks, bound=bound, method=used, int_a2=energy, timings=timings)
         timings["certify"], mark = lap(mark, timings["certify"])
         why = broken(out)
@@ -86,17 +85,6 @@ def lap(mark: float, spent: float) -> tuple[float, float]:
     """`spent` and the seconds since `mark`, and the new mark."""
     now = time.perf_counter()
     return spent + now - mark, now
-
-
-def optimise(stage: Setup, method: str, progress: Progress | None) -> tuple[Array, convex.Margins]:
-    """Trajectories by one method."""
-    if method == "convex":
-        x, margins, _ = convex.optimise(stage, progress)
-        return x, margins
-    from . import nlp
-
-    x, margins, _ = nlp.optimise(stage, None, progress)
-    return x, margins
 
 
 def refuse(task: Problem, margins: convex.Margins) -> InfeasibleError | None:
