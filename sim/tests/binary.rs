@@ -132,6 +132,18 @@ fn signals_end_it_cleanly_with_a_whole_log() {
 }
 
 #[test]
+fn a_full_disk_is_exit_4_and_named() {
+    let mut sim = Sim::start("full.toml", &["--log", "/dev/full"]);
+    std::thread::sleep(Duration::from_millis(300));
+    let id = sim.child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    assert_eq!(sim.wait().code(), Some(4));
+    let mut text = String::new();
+    sim.child.stderr.take().unwrap().read_to_string(&mut text).unwrap();
+    assert!(text.contains("/dev/full: cannot write the log") && !text.contains("panicked"), "{text}");
+}
+
+#[test]
 fn an_abandoned_simulator_ends_by_itself() {
     let mut sim = Sim::start("abandoned.toml", &["--exit-when-landed"]);
     drop(sim.child.stdin.take());

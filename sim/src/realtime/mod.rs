@@ -3,15 +3,16 @@
 #![allow(clippy::disallowed_methods)]
 
 mod clients;
+mod recording;
 mod stdin;
 
 use crate::exit::Failure;
 use crate::output::print_line;
 use clients::Clients;
-use fleet_agent::record::Recorder;
 use fleet_core::types::Nanos;
 use fleet_sim::log;
 use fleet_sim::world::{End, STEP, Vehicle, World, WorldConfig};
+use recording::{Entry, Recording};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::collections::BTreeMap;
@@ -62,7 +63,7 @@ pub fn run(config: &WorldConfig, log: Option<&Path>, exit_when_landed: bool) -> 
     for vehicle in &config.vehicles {
         clients.push(Clients::bind(&vehicle.id, vehicle.mavlink)?);
     }
-    let mut recorder = log.map(Recorder::create).transpose()?;
+    let recording = log.map(Recording::start).transpose()?;
     print_ready(&world, &clients)?;
 
     let mut clock = Clock::new()?;
@@ -74,7 +75,7 @@ pub fn run(config: &WorldConfig, log: Option<&Path>, exit_when_landed: bool) -> 
         for (client, vehicle) in clients.iter_mut().zip(world.vehicles_mut()) {
             client.receive(Nanos(clock.elapsed()), vehicle);
         }
-        advance(&mut world, &mut clock, recorder.as_mut())?;
+        advance(&mut world, &mut clock, recording.as_ref())?;
         for (client, vehicle) in clients.iter_mut().zip(world.vehicles_mut()) {
             let outgoing = vehicle.autopilot_mut().take_outgoing();
             client.send(vehicle.id(), &outgoing);
@@ -84,26 +85,29 @@ pub fn run(config: &WorldConfig, log: Option<&Path>, exit_when_landed: bool) -> 
         }
         std::thread::sleep(WAKE);
     }
-    if let Some(recorder) = recorder {
-        recorder.finish()?;
+    if let Some(recording) = recording {
+        recording.finish()?;
     }
     print_line(&Done { done: true, end: world.vehicles().iter().map(|v| (v.id(), v.end())).collect() });
     Ok(())
 }
 
 /// Steps the world until it has caught up with the wall clock.
-fn advance(world: &mut World, clock: &mut Clock, mut recorder: Option<&mut Recorder>) -> Result<(), Failure> {
+fn advance(world: &mut World, clock: &mut Clock, recording: Option<&Recording>) -> Result<(), Failure> {
     for _ in 0..CATCH_UP {
         if world.now().0 + STEP > clock.elapsed() {
             return Ok(());
         }
-        if let Some(recorder) = recorder.as_deref_mut() {
-            log::record_truth(recorder, world, clock.unix_base + world.now().0)?;
+        if let Some(recording) = recording {
+            for message in log::truth(world, clock.unix_base + world.now().0) {
+                recording.write(Entry::Truth(message))?;
+            }
         }
         for crash in world.step() {
             tracing::error!(drone = crash.drone, what = crash.what, p = ?crash.p.as_slice(), "crash");
-            if let Some(recorder) = recorder.as_deref_mut() {
-                log::record_crash(recorder, &crash, clock.unix_base + crash.at.0)?;
+            if let Some(recording) = recording {
+                let at_ns = clock.unix_base + crash.at.0;
+                recording.write(Entry::Crash { at_ns, crash })?;
             }
         }
     }
