@@ -8,11 +8,47 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def unswallowed() -> Iterator[None]:
+    """Raise a KeyboardInterrupt at the end of the block that foreign code inside has caught.
+
+    CasADi asks Python for signals during a solve, and then reports the exception of the handler as one of
+    several failures of the solver, from which it cannot be told apart.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    raised = False
+
+    def noting(handler: Callable[[int, FrameType | None], Any]) -> Callable[[int, FrameType | None], None]:
+        def on_signal(number: int, frame: FrameType | None) -> None:
+            nonlocal raised
+            try:
+                handler(number, frame)
+            except KeyboardInterrupt:
+                raised = True
+                raise
+
+        return on_signal
+
+    before = {one: handler for one in _SIGNALS if callable(handler := signal.getsignal(one))}
+    for one, handler in before.items():
+        signal.signal(one, noting(handler))
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    if raised:
+        raise KeyboardInterrupt
 
 
 class Interrupt:

@@ -89,9 +89,24 @@ def test_at_any_moment_of_the_beginning(
     flight.interrupt()
     answer = flight.end(15.0)
     assert answer.code in {130, -signal.SIGINT}, answer.err
+    assert not flight.run.exists()
     # Before its first own line runs, Python itself ends by the signal, and may say so with a traceback.
     if answer.code == 130:
-        assert not flight.run.exists()
+        answer.assert_no_traceback()
+
+
+@pytest.mark.parametrize("delay", [1.0, 1.5, 2.0, 2.5])
+def test_while_planning(tmp_path: Path, delay: float) -> None:
+    """Solvers in C must not swallow it: in the middle of IPOPT it was lost, and the command ended with 0."""
+    slow = str(SCENARIOS / "power_tower_4.toml")
+    process = start("plan", slow, "--method", "nlp", "-o", "x.plan.cbor", "--json", cwd=tmp_path)
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    answer = finish(process, 20.0)
+    answer.assert_no_traceback()
+    assert answer.code == 130, answer.err
+    assert answer.json["errors"][0]["code"] == "interrupted"
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -16,6 +16,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet.interrupt import unswallowed
+
 from . import clearance as near
 from .convex import GIVEN_UP, SOFT, TOLERANCE, Margins, Steps, better
 from .knots import KNOT, Array, Grid, Pieces, difference, hermite
@@ -243,14 +245,15 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Arr
     for factor in SHARPER if program.smoothed else (1.0,):
         weight = SOFT if hold is None else 1.0
         parameters = [weight, -1e3 if hold is None else hold, factor * task.c]
-        found = solver(
-            x0=guess,
-            p=parameters,
-            lbx=np.concatenate(program.low),
-            ubx=np.concatenate(program.high),
-            lbg=np.concatenate(program.g_low),
-            ubg=np.concatenate(program.g_high),
-        )
+        with unswallowed():
+            found = solver(
+                x0=guess,
+                p=parameters,
+                lbx=np.concatenate(program.low),
+                ubx=np.concatenate(program.high),
+                lbg=np.concatenate(program.g_low),
+                ubg=np.concatenate(program.g_high),
+            )
         if solver.stats()["return_status"] != "Solve_Succeeded":
             return None
         guess = np.asarray(found["x"]).ravel()
