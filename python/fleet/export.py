@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from fleet import _core
+from fleet.files import replacing
 from fleet.log.flight import Array, Flight
 
 COLUMNS = ["t", "drone", "source", "px", "py", "pz", "vx", "vy", "vz", "ax", "ay", "az"]
@@ -39,18 +39,18 @@ def flight_rows(flight: Flight, hz: float) -> Iterator[list[str]]:
 
 
 def write(path: Path, rows: Iterator[list[str]]) -> int:
-    """Write rows under the header; returns how many. Temporary file, flush to disk, rename."""
-    temporary = path.with_name(path.name + ".part")
+    """Write rows under the header; returns how many.
+
+    Raises:
+        InputError: when the file cannot be written.
+    """
     count = 0
-    with temporary.open("w", newline="") as stream:
+    with replacing(path) as temporary, temporary.open("w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(COLUMNS)
         for row in rows:
             writer.writerow(row)
             count += 1
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(path)
     return count
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -91,17 +93,29 @@ def read_scenario(path: Path) -> Scenario:
 
 
 def write_atomic(path: Path, payload: bytes) -> None:
-    """Write ``payload`` to a temporary file beside ``path``, flush it to disk, rename.
+    """Write ``payload`` as `replacing` does.
 
     Raises:
         InputError: when the folder does not exist or cannot be written.
     """
+    with replacing(path) as temporary:
+        temporary.write_bytes(payload)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary file beside ``path`` to write to; flushed to disk and renamed at the end of the block.
+
+    Raises:
+        InputError: when the folder does not exist or cannot be written.
+    """
+    if not path.name or path.is_dir():
+        raise bad_input("file", "is a folder; legal is the name of a file", file=str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         try:
-            with temporary.open("wb") as stream:
-                stream.write(payload)
-                stream.flush()
+            yield temporary
+            with temporary.open("rb+") as stream:
                 os.fsync(stream.fileno())
             temporary.replace(path)
         finally:

@@ -90,13 +90,15 @@ def router(
 
 
 @contextmanager
-def _linked(connect_to: str, fleet: str) -> Iterator[Link]:
+def _linked(connect_to: str, fleet: str, drones: list[str] | None) -> Iterator[Link]:
     from fleet import _core
     from fleet.ship.link import Link
     from fleet.ship.session import connect
 
     endpoint = parse_endpoint(connect_to, field="--connect")
     _check_name(fleet, "--fleet", _core.is_name)
+    for drone in drones or []:
+        _check_name(drone, "DRONE", _core.is_name)
     with connect(endpoint) as session:
         link = Link(session, fleet)
         try:
@@ -115,10 +117,6 @@ def _check_name(name: str, field: str, is_name: Callable[[str], bool]) -> None:
 
 
 def _chosen(link: Link, drones: list[str] | None) -> list[str]:
-    from fleet import _core
-
-    for drone in drones or []:
-        _check_name(drone, "DRONE", _core.is_name)
     chosen = drones or link.drones()
     if not chosen:
         raise environment(
@@ -134,7 +132,10 @@ def status(
 
     Example: fleet status --connect tcp/127.0.0.1:7447
     """
-    with reply("status", as_json=as_json, keys=("drones",)) as answer, _linked(connect, fleet) as link:
+    with (
+        reply("status", as_json=as_json, keys=("drones",)) as answer,
+        _linked(connect, fleet, drones) as link,
+    ):
         found = [link.status(drone, 3.0) for drone in _chosen(link, drones)]
         answer.fields["drones"] = found
         if not as_json:
@@ -168,7 +169,10 @@ def _operator(name: Command) -> Callable[..., None]:
     ) -> None:
         from fleet.ship.operator import command_all
 
-        with reply(name, as_json=as_json, keys=("drones",)) as answer, _linked(connect, fleet) as link:
+        with (
+            reply(name, as_json=as_json, keys=("drones",)) as answer,
+            _linked(connect, fleet, drones) as link,
+        ):
             answers = command_all(link, _chosen(link, drones), name)
             answer.fields["drones"] = [{"id": one.drone, "accepted": one.error is None} for one in answers]
             for one in answers:

@@ -1,9 +1,9 @@
 """The report's HTML page."""
 
-import os
 from pathlib import Path
 from typing import Any
 
+from fleet.files import write_atomic
 from fleet.log.flight import Flight
 from fleet.verdict import Verdict
 
@@ -13,7 +13,8 @@ _TEMPLATE = Path(__file__).with_name("page.html")
 def write(flight: Flight, verdict: Verdict, path: Path) -> None:
     """Write the report of `flight` as one self-contained HTML file.
 
-    Temporary file, flush to disk, rename.
+    Raises:
+        InputError: when the file cannot be written.
     """
     from jinja2 import Environment, StrictUndefined
 
@@ -22,12 +23,7 @@ def write(flight: Flight, verdict: Verdict, path: Path) -> None:
     )
     environment.filters["metres"] = _metres
     page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(**_context(flight, verdict))
-    temporary = path.with_name(path.name + ".part")
-    with temporary.open("w", encoding="utf-8") as stream:
-        stream.write(page)
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(path)
+    write_atomic(path, page.encode())
 
 
 def _metres(value: float | None, digits: int = 2) -> str:
@@ -38,6 +34,7 @@ def _context(flight: Flight, verdict: Verdict) -> dict[str, Any]:
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 
+    from fleet.certificate import visitors
     from fleet.report import figures
 
     def embed(figure: Any) -> Markup | None:
@@ -53,6 +50,7 @@ def _context(flight: Flight, verdict: Verdict) -> dict[str, Any]:
         "hash": flight.plan_hash,
         "log": flight.path.name,
         "verdict": verdict,
+        "visits": visitors(flight.plan),
         "plotly": Markup(get_plotlyjs()),
         "scene": embed(figures.scene(flight)),
         "motions": [(d["id"], embed(figures.motion(flight, k))) for k, d in enumerate(flight.plan["drones"])],
