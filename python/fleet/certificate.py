@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet import _core
+from fleet.stl.normal import places_of
 
 #: Difference between a plan's number and the recomputed one that is rounding [m].
 SAME = 1e-6
@@ -126,6 +127,25 @@ def flight(content: Mapping[str, Any], drone: Mapping[str, Any], track: _core.Tr
     if _core.inside(home, np.ascontiguousarray(knots[-1:, 1:4]))[0] <= 0:
         out.append(f"does not end inside {drone['home']}")
     return out + visits(content, drone, track)
+
+
+def visitors(content: Mapping[str, Any]) -> dict[str, list[tuple[str, float]]]:
+    """Who makes each clause of a plan true, and when: (drone, time [s]) of its visits; empty without.
+
+    `some d: d in tr1` speaks of every drone; the plan proves it by the one that was assigned.
+    """
+    found: dict[str, list[tuple[str, float]]] = {}
+    for clause in content["clauses"]:
+        formula = clause["formula"]
+        places = {(place.drone, place.region) for place in places_of(formula)}
+        window = [formula["from"], formula["to"]] if formula["op"] == "eventually" else None
+        found[clause["id"]] = [
+            (drone["id"], visit["t"])
+            for drone in content["drones"]
+            for visit in drone["visits"]
+            if (drone["id"], visit["region"]) in places and window in (None, list(visit["window"]))
+        ]
+    return found
 
 
 def heading_rate(knots: NDArray[np.float64]) -> float:

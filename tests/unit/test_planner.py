@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fleet import _core
-from fleet.certificate import verify
+from fleet.certificate import verify, visitors
 from fleet.planner import PlanResult, Status, plan
 from fleet.scenario import load
 
@@ -177,3 +177,13 @@ def loosened(text: str):
         changed = changed.replace("tube = 0.4", "tube = 0.01")
         path.write_text(changed)
         return load(path)
+
+
+def test_who_visits_for_each_clause() -> None:
+    """`some d` speaks of both drones; the plan says which of them makes it true."""
+    found = planned("power_tower")
+    who = visitors(found.plan)
+    assert set(who) == {clause["id"] for clause in found.plan["clauses"]}
+    for event in found.events:
+        assert who[event["region"]] == [(event["drone"], event["t"])]
+    assert who["safe"] == who["apart"] == who["home"] == []

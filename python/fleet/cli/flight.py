@@ -58,7 +58,7 @@ def simulate(mission: MissionArgument, run_dir: RunDirOption = None, as_json: Js
             answer.fields |= {"sim_s": flown.sim_s, "wall_s": flown.wall_s}
             with bar(answer.err, "log", 1.0) as progress:
                 finished = finish(plan, [flown.log], t0_of(flown.log), run, progress=progress)
-            _conclude(answer, finished, aborted=False)
+            _conclude(answer, plan, finished, aborted=False)
 
 
 def fly(
@@ -133,7 +133,7 @@ def _fly(
         )
     with bar(answer.err, "log", 1.0) as progress:
         finished = finish(plan, parts, flown.t0_ns, around.run, progress=progress)
-    _conclude(answer, finished, aborted=flown.aborted)
+    _conclude(answer, plan, finished, aborted=flown.aborted)
 
 
 def report(
@@ -191,7 +191,7 @@ def _mission(answer: Reply, path: Path) -> tuple[files.PlanFile, str]:
     return plan, world_of_plan(plan.plan)
 
 
-def _conclude(answer: Reply, finished: Any, *, aborted: bool) -> None:
+def _conclude(answer: Reply, plan: files.PlanFile, finished: Any, *, aborted: bool) -> None:
     verdict = finished.verdict
     word = "aborted" if aborted else show.word(verdict)
     judged = verdict.as_dict()
@@ -201,7 +201,7 @@ def _conclude(answer: Reply, finished: Any, *, aborted: bool) -> None:
     answer.fields |= {"log": str(finished.log), "report": str(finished.report), "verdict": word}
     answer.exit = int(_FINISHED[word])
     if not answer.as_json:
-        show.verdict(answer, verdict)
+        show.verdict(answer, plan.plan, verdict)
         if aborted:
             answer.say("aborted: the flight was broken off")
         answer.say(f"log:    {finished.log}")

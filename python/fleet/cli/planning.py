@@ -158,7 +158,7 @@ def verify(
         }
         answer.exit = int(Exit.SATISFIED if proof.ok else Exit.VIOLATED)
         if not as_json:
-            show.proof(answer)
+            show.proof(answer, found.plan)
 
 
 def _verify_log(answer: Reply, file: Path) -> None:
@@ -180,7 +180,7 @@ def _verify_log(answer: Reply, file: Path) -> None:
     }
     answer.exit = int(Exit.SATISFIED if verdict.satisfied else Exit.VIOLATED)
     if not answer.as_json:
-        show.verdict(answer, verdict)
+        show.verdict(answer, flight.plan, verdict)
 
 
 def export(

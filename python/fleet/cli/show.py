@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
@@ -30,7 +30,7 @@ def plan(answer: Reply, plan: dict[str, Any], fields: dict[str, Any]) -> None:
             event["drone"], event["region"], _f(event["t"]), f"{low:g} .. {high:g}", _f(event["slack_s"])
         )
     answer.out.print(visits)
-    answer.out.print(_clauses(fields["clauses"], ("rho", "rho_lower", "t_tightest")))
+    answer.out.print(_clauses(plan, fields["clauses"], ("rho", "rho_lower", "t_tightest")))
     spent = ", ".join(
         f"{name} {value:.2f} s" for name, value in fields["time_s"].items() if value is not None
     )
@@ -43,10 +43,10 @@ def plan(answer: Reply, plan: dict[str, Any], fields: dict[str, Any]) -> None:
         answer.say(f"plan: {fields['plan']}  sha256 {fields['hash'][:16]}...")
 
 
-def proof(answer: Reply) -> None:
+def proof(answer: Reply, plan: Mapping[str, Any]) -> None:
     """What `fleet verify` found in a plan."""
     found = answer.fields
-    answer.out.print(_clauses(found["clauses"], ("rho", "rho_lower", "t_tightest")))
+    answer.out.print(_clauses(plan, found["clauses"], ("rho", "rho_lower", "t_tightest")))
     for problem in found["problems"]:
         answer.say(f"problem: {problem}")
     bound = _f(found["rho_lower"])
@@ -58,14 +58,15 @@ def word(verdict: Verdict) -> str:
     return "satisfied" if verdict.satisfied else "violated"
 
 
-def verdict(answer: Reply, verdict: Verdict) -> None:
+def verdict(answer: Reply, plan: Mapping[str, Any], verdict: Verdict) -> None:
     """The judgement of a flight, per clause and per drone."""
     found = verdict.as_dict()
-    answer.out.print(_clauses(found["clauses"], ("rho_planned", "rho_lower", "rho_flown", "t_tightest")))
-    columns = ("rmse_m", "max_m", "replans", "min_clearance_m", "gap_max_ms", "end")
-    drones = _table("drone", *columns)
+    columns = ("rho_planned", "rho_lower", "rho_flown", "t_tightest")
+    answer.out.print(_clauses(plan, found["clauses"], columns))
+    per_drone = ("rmse_m", "max_m", "replans", "min_clearance_m", "gap_max_ms", "end")
+    drones = _table("drone", *per_drone)
     for drone in found["drones"]:
-        drones.add_row(drone["id"], *(_f(drone[column]) for column in columns))
+        drones.add_row(drone["id"], *(_f(drone[column]) for column in per_drone))
     answer.out.print(drones)
     for problem in verdict.problems:
         answer.say(f"problem: {problem}")
@@ -75,13 +76,17 @@ def verdict(answer: Reply, verdict: Verdict) -> None:
     )
 
 
-def _clauses(clauses: list[dict[str, Any]], columns: tuple[str, ...]) -> Table:
-    table = _table("clause", "kind", "drones", *columns)
+def _clauses(plan: Mapping[str, Any], clauses: list[dict[str, Any]], columns: tuple[str, ...]) -> Table:
+    from fleet.certificate import visitors
+
+    visits = visitors(plan)
+    table = _table("clause", "kind", "drones", "visited by", *columns)
     for clause in clauses:
         table.add_row(
             f"@{clause['id']}",
             clause["kind"],
             " ".join(clause["drones"]),
+            " ".join(dict.fromkeys(drone for drone, _ in visits[clause["id"]])) or "-",
             *(_f(clause[column]) for column in columns),
         )
     return table

@@ -80,6 +80,13 @@ def drones_of(formula: Formula) -> list[str]:
     return list(dict.fromkeys(_mentions(formula)))
 
 
+def places_of(formula: Formula) -> list[Visit]:
+    """The drones inside regions that a formula speaks of, in order of first appearance."""
+    if formula["op"] == "in":
+        return [Visit(formula["drone"], formula["region"])]
+    return list(dict.fromkeys(place for child in _children(formula) for place in places_of(child)))
+
+
 def _mentions(formula: Formula) -> Iterator[str]:
     op = formula["op"]
     if op in {"in", "outside"}:
