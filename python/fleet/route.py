@@ -193,10 +193,15 @@ def spread(least: Array, windows: Array, horizon: float, sample: float) -> Array
         if best < 1 - 1e-9:
             return None
         for k in range(done, end + 1):
+            waits = clock + best * least[k] < early[k]
             clock = max(clock + best * least[k], early[k])
             if clock > late[k] + 1e-9:
                 return None
             times[k] = clock
+            if waits:
+                # Waiting took time that the ratio had counted on: what follows is spread anew.
+                end = k
+                break
         done = end + 1
     out = np.floor(times[:n] / sample + 1e-6) * sample
     out = np.maximum(out, np.ceil(windows[:, 0] / sample - 1e-6) * sample)

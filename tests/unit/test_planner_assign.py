@@ -103,3 +103,12 @@ def test_spread_uses_the_slack_evenly() -> None:
     times = spread(np.array([2.0, 4.0, 2.0]), np.array([[0.0, 99.0], [0.0, 99.0]]), 16.0, 0.05)
     assert times is not None
     assert times == pytest.approx([4.0, 12.0], abs=0.051)
+
+
+def test_spread_waits_for_windows_that_open_late() -> None:
+    """Three visits at one place, 5 s from home: slack is for the way out and home, not for the waits."""
+    windows = np.array([[0.0, 20.0], [27.0, 33.0], [40.0, 46.0]])
+    times = spread(np.array([5.0, 0.0, 0.0, 5.0]), windows, 60.0, 0.05)
+    assert times is not None
+    assert ((times >= windows[:, 0]) & (times <= windows[:, 1])).all()
+    assert times[2] <= 55.0

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from . import clearance as near
+from .duties import Duties
 from .knots import Array
 from .rows import Block, energy, stack
 from .setup import SMOOTH, Setup, warm_start
@@ -37,12 +38,13 @@ LIFTS = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-
 
 @dataclass(frozen=True)
 class Margins:
-    """Reached: r [m] over all, worst clause, share of limits, least margin over the tube [m]."""
+    """Reached: r [m] over all, worst clause, share of limits, least margin over the tube [m], its clause."""
 
     r: float
     clause: str
     share: float
     tube: float
+    short: str
 
 
 @dataclass
@@ -54,12 +56,15 @@ class Steps:
     beyond: list[near.Watch]
     apart: list[near.Watch]
     bounds: near.Bounds
+    duties: Duties
 
     @classmethod
     def of(cls, setup: Setup) -> Steps:
         """No rows posed yet."""
         within, beyond, apart = near.watches(setup.problem, setup.grid)
-        return cls(setup, within, beyond, apart, near.Bounds.none_posed(setup.problem, setup.grid))
+        bounds = near.Bounds.none_posed(setup.problem, setup.grid)
+        duties = Duties(setup.problem, setup.grid, setup.bound)
+        return cls(setup, within, beyond, apart, bounds, duties)
 
     def rows(self, x: Array, level: float, lift: Array | None = None) -> list[Block]:
         """Rows that can matter near the trajectory `x` when r may reach `level`."""
@@ -71,28 +76,30 @@ class Steps:
             blocks += near.outside_rows(w, x, wanted)
         for w in self.apart:
             blocks += near.apart_rows(w, x, wanted, level, tube, lift)
+        blocks += self.duties.rows(x, wanted, level)
         return blocks
 
     def margins(self, x: Array) -> Margins:
         """Margins of the trajectory over everything, posed or not."""
         wanted, tube = self.setup.bound, self.setup.problem.tube
-        found: list[tuple[float, str]] = [(wanted, "")]
-        least = np.inf
+        found: list[tuple[float, float, str]] = []
         for w in self.within:
-            found.append((float(near.inside_margin(w, x).min()), w.clause))
+            margin = float(near.inside_margin(w, x).min())
+            found.append((margin, margin - tube, w.clause))
         for w in self.beyond:
-            found.append((near.outside_least(w, x, wanted), w.clause))
-        least = min(least, *(m for m, _ in found)) - tube
+            margin = near.outside_least(w, x, wanted)
+            found.append((margin, margin - tube, w.clause))
         for w in self.apart:
-            margin, asked = near.apart_margin(w, x)[0], near.pair_least(w, x, tube)
-            found.append((float((margin - np.maximum(asked - wanted, 0.0)).min()), w.clause))
-            least = min(least, float((margin - asked).min()))
+            each, asked = near.apart_margin(w, x)[0], near.pair_least(w, x, tube)
+            margin = float((each - np.maximum(asked - wanted, 0.0)).min())
+            found.append((margin, float((each - asked).min()), w.clause))
         for clause, block in self.setup.visits:
             slack = block.rhs - (block.vals * x[block.cols]).sum(axis=1)
-            found.append((float(slack.min()), clause))
-            least = min(least, float(slack.min()) - tube)
-        r, worst = min(found)
-        return Margins(r, worst, self.bounds.worst(x), least)
+            found.append((float(slack.min()), float(slack.min()) - tube, clause))
+        found += self.duties.margins(x, wanted)
+        r, worst = min([(wanted, ""), *((margin, clause) for margin, _, clause in found)])
+        least, short = min((spare, clause) for _, spare, clause in found)
+        return Margins(r, worst, self.bounds.worst(x), least, short)
 
     def step(self, x: Array, hold: float | None, lift: Array | None = None) -> Array | None:
         """One convex step from `x`: maximise r, or hold it at `hold` and minimise energy."""

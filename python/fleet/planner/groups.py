@@ -76,15 +76,16 @@ def fly(
         boxes = np.stack([np.minimum(boxes[0], real[0]), np.maximum(boxes[1], real[1])])
     margins = [solved.margins for solved in found.values()]
     worst = min(margins, key=lambda m: m.r)
-    whole = Margins(worst.r, worst.clause, max(m.share for m in margins), min(m.tube for m in margins))
+    tight, share = min(margins, key=lambda m: m.tube), max(m.share for m in margins)
+    whole = Margins(worst.r, worst.clause, share, tight.tube, tight.short)
     tracks = {d: t for members, s in found.items() for d, t in zip(members, s.tracks, strict=True)}
     energy, build = sum(s.int_a2 for s in found.values()), sum(s.build_s for s in known.values())
     return Flight([tracks[d] for d in range(len(task.ids))], blamed(whole, margins), energy, build)
 
 
 def blamed(whole: Margins, margins: list[Margins]) -> Margins:
-    """The whole with the clause of the part that breaks limits or tube, where one does."""
-    bad = [m for m in margins if m.share > 1] or [m for m in margins if m.tube == whole.tube < 0]
+    """The whole with the clause of the part that breaks limits, where one does."""
+    bad = [m for m in margins if m.share > 1]
     return replace(whole, clause=bad[0].clause) if bad else whole
 
 

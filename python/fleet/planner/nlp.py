@@ -8,6 +8,7 @@ through the smooth robustness of smooth.py. Stage functions are built once and m
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -34,6 +35,8 @@ SHARPER = (1.0, 4.0, 16.0)
 GUIDE = 0.5
 #: Margins round a corner are measured on parts of a piece, up to this much too low [m].
 MEASURED = 5e-3
+#: CPU time after which no further solve of clauses without a normal form starts, and longest of one [s].
+PATIENCE = 5.0
 #: Solves with further pieces posed, when a solution passes what was not posed.
 ROUNDS = 4
 
@@ -220,7 +223,7 @@ def build(steps: Steps, now: Array, margins: Margins, level: float) -> tuple[Pro
     return program, -r + p[0] * cost, p
 
 
-def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Array | None:
+def solve(steps: Steps, now: Array, margins: Margins, hold: float | None, patience: float) -> Array | None:
     """One solve, sharpening smooth robustness if there is any; None unless IPOPT succeeded."""
     task = steps.setup.problem
     program, objective, p = build(steps, now, margins, steps.setup.bound if hold is None else hold)
@@ -235,6 +238,7 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None) -> Arr
             "mu_strategy": "adaptive",
             # Smooth robustness over many samples makes a dense and indefinite Hessian.
             "hessian_approximation": "limited-memory" if task.spec.rest else "exact",
+            **({"max_cpu_time": max(patience, 0.01)} if task.spec.rest else {}),
             "print_level": 0,
             "sb": "yes",
         },
@@ -266,7 +270,7 @@ def optimise(
     """Maximise r, then minimise energy at the r reached, from the warm start or from `start`."""
     steps = Steps.of(setup)
     best = warm_start(setup) if start is None else start
-    top, count = steps.margins(best), 0
+    top, count, began = steps.margins(best), 0, time.process_time()
     for hold in (False, True):
         # Quasi-Newton steps hardly get anywhere on energy; `SOFT` has kept the flight smooth already.
         if hold and (not usable(top) or setup.problem.spec.rest):
@@ -275,7 +279,8 @@ def optimise(
         x, last = best, top
         for _ in range(ROUNDS):
             steps.rows(x, setup.bound if level is None else level)
-            found = solve(steps, best, top, level)
+            patience = PATIENCE - (time.process_time() - began)
+            found = solve(steps, best, top, level, patience)
             count += 1
             if found is None:
                 break

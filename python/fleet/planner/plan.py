@@ -13,6 +13,7 @@ from .ceiling import rho_bound
 from .problem import Problem, problem
 from .result import PlanResult, result
 from .schedule import Itinerary, schedules
+from .sketch import sketched
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
@@ -29,8 +30,8 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     """Plan a scenario: assign, route, optimise, certify.
 
     `method` is "convex" (sequential convex steps), "nlp" (the nonlinear program, IPOPT) or "auto":
-    convex, and the nonlinear program for clauses that have no normal form. `progress(stage, rho)` is
-    called at every stage. The same scenario gives the same bytes.
+    convex, then the nonlinear program where that fails. `progress(stage, rho)` is called at every
+    stage. The same scenario gives the same bytes.
 
     Raises InfeasibleError, naming a clause, when the mission cannot hold or nothing was found that
     keeps the tube's margins; ValueError for an unknown method.
@@ -44,9 +45,8 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     bound = rho_bound(task)
     timings |= dict.fromkeys(("route", "build", "solve", "certify"), 0.0)
     tell("route", bound)
-    ways = list(schedules(task, min(bound, WIDEST)))
+    ways, refusal = itineraries(task, min(bound, WIDEST))
     timings["route"], mark = lap(mark, timings["route"])
-    refusal: InfeasibleError | None = None
     for way, used in attempts(task, ways, method):
         tell("build", bound)
         flight = groups.fly(task, way, min(bound, WIDEST), METHODS[used], progress)
@@ -62,20 +62,28 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
         out = result(scenario, task, way, tracks, bound=bound, method=used, int_a2=energy, timings=timings)
         timings["certify"], mark = lap(mark, timings["certify"])
         why = broken(out)
-        if why is not None:
-            refusal = refusal or why
-            continue
-        return out
+        if why is None:
+            return out
+        refusal = refusal or why
     assert refusal is not None, "there is always an attempt, or schedules raises"
     raise refusal
+
+
+def itineraries(task: Problem, bound: float) -> tuple[list[Itinerary], InfeasibleError | None]:
+    """Itineraries that keep clauses without a normal form too, or those without them and why.
+
+    Raises InfeasibleError when not even the other clauses have an itinerary.
+    """
+    try:
+        return list(schedules(sketched(task, bound), bound)), None
+    except InfeasibleError as error:
+        return list(schedules(task, bound)), error
 
 
 def attempts(task: Problem, ways: list[Itinerary], method: str) -> Iterator[tuple[Itinerary, str]]:
     """Itineraries and methods in the order in which they are tried."""
     if method != "auto":
         yield from ((way, method) for way in ways)
-    elif task.spec.rest:
-        yield from ((way, "nlp") for way in ways)
     else:
         yield from ((way, "convex") for way in ways)
         yield ways[0], "nlp"
@@ -96,17 +104,17 @@ def refuse(task: Problem, margins: convex.Margins) -> InfeasibleError | None:
     if margins.tube < -1e-6:
         asked = f"{task.tube:g} m (pairs {2 * task.tube:g} m and more with closing speed)"
         text = f"the best margin found is {margins.tube + task.tube:.2f} m, and the tube asks for {asked}"
-        return InfeasibleError(text, clause=margins.clause)
+        return InfeasibleError(text, clause=margins.short)
     return None
 
 
 def broken(found: PlanResult) -> InfeasibleError | None:
-    """Why a plan does not do although it keeps limits and margins: a clause of it is violated at the samples.
+    """Why a plan does not do although it keeps limits and margins: a clause of it is not proved.
 
-    Clauses without a normal form are only guided by their smooth robustness; the exact one decides.
+    The margins of clauses without a normal form are those of chosen witnesses; the certificate decides.
     """
-    worst = min(found.plan["clauses"], key=lambda clause: clause["result"]["rho"])
-    rho = float(worst["result"]["rho"])
+    worst = min(found.plan["clauses"], key=lambda clause: clause["result"]["rho_lower"])
+    rho = float(worst["result"]["rho_lower"])
     if rho > 0:
         return None
     text = f"the best robustness found is {rho:.2f} m, and the mission asks for more than 0"

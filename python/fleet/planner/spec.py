@@ -1,8 +1,8 @@
 """Normal form of the mission for the planner: visits, homes, invariants, and the rest.
 
 Visits and homes become knots, invariants become rows on control points, both exact in continuous
-time; any other nest of operators is `rest` and goes to the nonlinear program (nlp.py). Formulas are
-the dicts of `Formula` in crates/core.
+time; any other nest of operators is `rest`, whose witnesses and branches are chosen step by step
+(witness.py). Formulas are the dicts of `Formula` in crates/core.
 """
 
 from __future__ import annotations
