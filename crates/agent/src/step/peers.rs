@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 const MISSION_TIME: f64 = 0.5;
 /// Oldest heartbeat that counts [s]: five may be lost.
 const AGE: f64 = 1.2;
+/// Drones that are remembered; whoever can publish could name any number of them.
+const MOST: usize = 256;
 
 /// Newest heartbeat of every drone heard, with its arrival.
 #[derive(Clone, Debug, Default)]
@@ -21,7 +23,9 @@ impl Peers {
     pub fn take(&mut self, now: Nanos, bytes: &[u8]) {
         let Ok(envelope) = Envelope::<Up>::from_bytes(bytes) else { return };
         if let Up::Heartbeat(heartbeat) = envelope.body {
-            self.heard.insert(heartbeat.drone.clone(), (now, heartbeat));
+            if self.heard.len() < MOST || self.heard.contains_key(&heartbeat.drone) {
+                self.heard.insert(heartbeat.drone.clone(), (now, heartbeat));
+            }
         }
     }
 
@@ -54,6 +58,12 @@ mod tests {
     use fleet_core::wire::{SCHEMA, encode};
 
     fn heard(change: impl Fn(&mut Heartbeat)) -> Peers {
+        let mut peers = Peers::default();
+        peers.take(Nanos(0), &message(change));
+        peers
+    }
+
+    fn message(change: impl Fn(&mut Heartbeat)) -> Vec<u8> {
         let mut heartbeat = Heartbeat {
             drone: "d2".into(),
             now: Nanos(7),
@@ -74,9 +84,18 @@ mod tests {
             valid_until: Nanos(8),
             body: Up::Heartbeat(heartbeat),
         };
-        let mut peers = Peers::default();
-        peers.take(Nanos(0), &encode(&envelope).expect("encodes"));
-        peers
+        encode(&envelope).expect("encodes")
+    }
+
+    #[test]
+    fn a_flood_of_names_is_forgotten_and_known_drones_are_heard() {
+        let mut peers = heard(|_| ());
+        for k in 0..2 * MOST {
+            peers.take(Nanos(1), &message(|h| h.drone = format!("x{k}")));
+        }
+        assert_eq!(peers.heard.len(), MOST);
+        peers.take(Nanos(2), &message(|h| h.mode = Mode::Abort));
+        assert_eq!(peers.heard["d2"].0, Nanos(2));
     }
 
     #[test]
