@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet import _core
+from fleet.relevance import CUT, Boxes
 from fleet.stl.normal import places_of
 
 #: Difference between a plan's number and the recomputed one that is rounding [m].
@@ -52,10 +53,16 @@ def prove(
     fleet = _core.Fleet(list(drones), list(regions))
     times = np.arange(round(horizon / sample) + 1).astype(np.float64) * sample
     positions = np.stack([np.ascontiguousarray(t.sample(times)[:, :3]) for t in tracks])
+    boxes = Boxes(drones, regions, tracks)
     found: dict[str, dict[str, float]] = {}
     for name, formula in clauses:
-        rho, at = fleet.evaluate(formula, positions, sample)
-        lower, _ = fleet.lower_bound(formula, list(tracks), sample)
+        decisive = boxes.reduced(formula)
+        rho, at = fleet.evaluate(decisive, positions, sample)
+        lower, _ = fleet.lower_bound(decisive, list(tracks), sample)
+        if not 0 < lower <= rho < CUT:
+            # What was left out may decide.
+            rho, at = fleet.evaluate(formula, positions, sample)
+            lower, _ = fleet.lower_bound(formula, list(tracks), sample)
         found[name] = {"rho": rho, "rho_lower": min(lower, rho), "t_tightest": at}
     return Proof(
         found,

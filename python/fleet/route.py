@@ -66,14 +66,11 @@ def cropped(faces: Array, low: Array, high: Array) -> Array:
     return np.vstack([faces, np.column_stack([one, high]), np.column_stack([-one, -low])])
 
 
-def touching(obstacles: Sequence[Array], low: Array, high: Array) -> list[Array]:
-    """The obstacles whose bounding boxes touch the box from `low` to `high` (3,) [m]."""
+def bounding_boxes(obstacles: Sequence[Array]) -> Array:
+    """Boxes (2, n, 3: low, high) [m] around polyhedra."""
     corners = [vertices(faces)[0] for faces in obstacles]
-    return [
-        faces
-        for faces, c in zip(obstacles, corners, strict=True)
-        if (c.min(axis=0) <= high).all() and (c.max(axis=0) >= low).all()
-    ]
+    low, high = [c.min(axis=0) for c in corners], [c.max(axis=0) for c in corners]
+    return np.array([low, high]).reshape(2, len(obstacles), 3)
 
 
 def blocked(a: Array, b: Array, faces: Array) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fleet.assign import EXACT, Legs, assign
 from fleet.errors import InfeasibleError
-from fleet.route import Network, cropped, leg_time, network, reach, spread, touching, turn_time
+from fleet.route import Network, bounding_boxes, cropped, leg_time, network, reach, spread, turn_time
 
 from .knots import Array, Ints
 from .problem import Problem
@@ -79,36 +79,39 @@ def survey(problem: Problem, bound: float, *, local: bool = False) -> Map:
     names = (*(f"start of {d}" for d in problem.ids), *regions)
     if local:
         paths: dict[tuple[int, int], Array] = {}
+        boxes = bounding_boxes([problem.regions[o] for o in problem.obstacles])
         for members in neighbourhoods(problem, points, home, number):
-            paths |= routes(problem, points, members, place, home, bound).paths
+            low, high = points[members].min(axis=0) - DETOUR, points[members].max(axis=0) + DETOUR
+            near = np.flatnonzero(((boxes[0] <= high) & (boxes[1] >= low)).all(axis=1))
+            room = cropped(problem.regions[problem.workspace], low, high)
+            paths |= routes(problem, points, members, near, room, place, home, bound)
         return Map(Network(paths), points, names, tuple(range(n)), home, place)
-    ways = routes(problem, points, None, place, home, bound)
-    return Map(ways, points, names, tuple(range(n)), home, place)
+    everywhere, every = np.arange(len(points)), np.arange(len(problem.obstacles))
+    room = problem.regions[problem.workspace]
+    paths = routes(problem, points, everywhere, every, room, place, home, bound)
+    return Map(Network(paths), points, names, tuple(range(n)), home, place)
 
 
 def routes(
     problem: Problem,
     points: Array,
-    members: Ints | None,
+    members: Ints,
+    near: Ints,
+    room: Array,
     place: tuple[tuple[int, ...], ...],
     home: tuple[int, ...],
     bound: float,
-) -> Network:
-    """Ways between all points, or between those of `members` past the obstacles around them."""
-    room = problem.regions[problem.workspace]
-    obstacles = [problem.regions[o] for o in problem.obstacles]
-    chosen = np.arange(len(points)) if members is None else members
-    if members is not None:
-        low, high = points[members].min(axis=0) - DETOUR, points[members].max(axis=0) + DETOUR
-        room, obstacles = cropped(room, low, high), touching(obstacles, low, high)
-    inside = {int(p): k for k, p in enumerate(chosen)}
+) -> dict[tuple[int, int], Array]:
+    """Ways in `room` between the points of `members` past the obstacles of `near`."""
+    obstacles = [problem.regions[problem.obstacles[k]] for k in near]
+    inside = {int(p): k for k, p in enumerate(members)}
     drones = [d for d in range(len(problem.ids)) if d in inside]
     needed = {(inside[d], inside[p]) for d in drones for p in (*place[d], home[d]) if p in inside}
     for share in CLEARANCE:
-        ways = network(points[chosen], room, obstacles, max(share * bound, problem.tube))
+        ways = network(points[members], room, obstacles, max(share * bound, problem.tube))
         if all(ways.path(d, p) is not None for d, p in needed):
             break
-    return Network({(int(chosen[i]), int(chosen[j])): path for (i, j), path in ways.paths.items()})
+    return {(int(members[i]), int(members[j])): path for (i, j), path in ways.paths.items()}
 
 
 def neighbourhoods(
