@@ -27,7 +27,7 @@ def publish(name: str, rows: list[dict[str, Any]]) -> None:
         ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.strip()
     machine = {
-        "cpu": platform.processor() or platform.machine(),
+        "cpu": _cpu(),
         "cores": os.cpu_count(),
         "load": os.getloadavg()[0],
     }
@@ -35,6 +35,14 @@ def publish(name: str, rows: list[dict[str, Any]]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     document = {"schema": SCHEMA, "git": git, "machine": machine, "rows": rows}
     (folder / f"{name}.json").write_text(json.dumps(document, indent=1) + "\n")
+
+
+def _cpu() -> str:
+    """Model name of the processor where Linux tells it, else the architecture."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
 
 
 def fleet(*arguments: str) -> tuple[int, dict[str, Any]]:
