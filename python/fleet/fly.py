@@ -178,7 +178,7 @@ def _agent_argv(
         "--record": str(around.run.part(drone)),
         "--state-dir": str(around.run.state),
     }
-    flags = ["--exit-when-landed", *(["--insecure"] if around.insecure else [])]
+    flags = ["--exit-when-landed", "--exit-when-orphaned", *(["--insecure"] if around.insecure else [])]
     return [str(program), *(word for pair in options.items() for word in pair), *flags]
 
 

@@ -192,3 +192,19 @@ def test_a_taken_port_is_an_environment_error() -> None:
         run = subprocess.run(words, check=False, capture_output=True, text=True, timeout=30)
     assert run.returncode == 4
     assert endpoint in run.stderr
+
+
+def test_an_orphan_ends_by_itself() -> None:
+    words = [str(find_program("fleet-agent")), "--drone", "d1", "--zenoh", f"tcp/127.0.0.1:{free_port()}"]
+    words += ["--mavlink", "udpin:127.0.0.1:0", "--exit-when-orphaned"]
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdin is not None
+    assert process.stdout is not None
+    assert json.loads(process.stdout.readline())["ready"]
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(timeout=6.0)
+    process.stdin.close()
+    assert process.wait(timeout=20.0) == 0
+    process.stdout.close()
+    assert process.stderr is not None
+    process.stderr.close()

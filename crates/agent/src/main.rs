@@ -55,7 +55,9 @@ fn main() -> ExitCode {
         None => match Config::load(&cli) {
             Err(error) => failed(BAD_INPUT, &error),
             Ok(config) if cli.print_config => print_config(&config),
-            Ok(config) => fly(config).unwrap_or_else(|error| failed(ENVIRONMENT, &error)),
+            Ok(config) => {
+                fly(config, cli.exit_when_orphaned).unwrap_or_else(|error| failed(ENVIRONMENT, &error))
+            }
         },
     };
     ExitCode::from(code)
@@ -101,7 +103,7 @@ fn replay_log(arguments: &ReplayArgs) -> u8 {
     }
 }
 
-fn fly(config: Config) -> Result<u8, RuntimeError> {
+fn fly(config: Config, exit_when_orphaned: bool) -> Result<u8, RuntimeError> {
     let Config { link: settings, agent } = config;
     if settings.insecure {
         tracing::warn!("--insecure: whoever reaches these addresses can command this drone");
@@ -112,6 +114,9 @@ fn fly(config: Config) -> Result<u8, RuntimeError> {
     let link = VehicleLink::open(settings.mavlink)?;
     let address = link.local_address()?;
     handle_signals(wake.clone())?;
+    if exit_when_orphaned {
+        watch_stdin(wake.clone())?;
+    }
     let reader = link.read(wake.clone(), Arc::clone(&stop))?;
     let (outboxes, threads) = start_threads(&settings, &agent, clock, &wake)?;
     let codec = Codec::new(settings.system, settings.system);
@@ -129,7 +134,7 @@ fn fly(config: Config) -> Result<u8, RuntimeError> {
     threads.finish(clock);
     drop(reader);
     Ok(match exit {
-        Exit::Signal | Exit::Landed => OK,
+        Exit::Signal | Exit::Landed | Exit::Orphaned => OK,
         Exit::Forced => INTERRUPTED,
     })
 }
@@ -207,6 +212,15 @@ fn handle_signals(wake: Queue<Wake>) -> Result<(), RuntimeError> {
         }
     })?;
     Ok(())
+}
+
+/// Standard input is a pipe that only the starting process holds: its end tells that this process is gone.
+fn watch_stdin(wake: Queue<Wake>) -> Result<(), RuntimeError> {
+    thread("stdin", move || {
+        // Whatever is written there is not for the agent; an error is an end as well.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        let _ = wake.offer(Wake::Orphaned);
+    })
 }
 
 fn thread(name: &'static str, body: impl FnOnce() + Send + 'static) -> Result<(), RuntimeError> {

@@ -39,6 +39,9 @@ pub struct Cli {
     /// End with exit code 0 when the drone has flown and is disarmed
     #[arg(long)]
     pub exit_when_landed: bool,
+    /// End with exit code 0 when standard input is closed and the drone stays disarmed: whoever started it is gone
+    #[arg(long)]
+    pub exit_when_orphaned: bool,
     /// Allow addresses off this machine, although nothing is encrypted or signed
     #[arg(long)]
     pub insecure: bool,

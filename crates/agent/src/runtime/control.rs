@@ -24,6 +24,9 @@ const MAX_WAKES: usize = 256;
 const FORCE_WINDOW: f64 = 2.0;
 /// How long a landed drone stays disarmed before the process ends [s]: events still go out.
 const SETTLE: f64 = 1.0;
+/// An orphan waits this long without being armed before it ends [s]: longer than any pause of a mission
+/// that still runs.
+const ORPHAN: f64 = 5.0;
 
 /// Why the control loop ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +37,8 @@ pub enum Exit {
     Forced,
     /// The drone has flown and is disarmed.
     Landed,
+    /// Whoever started the process is gone and the drone stays disarmed.
+    Orphaned,
 }
 
 /// Queues to the other threads.
@@ -134,6 +139,7 @@ impl Control {
         match wake {
             Wake::Input(input) => inbox.push(input),
             Wake::Signal => self.watch.signal(self.clock.now()),
+            Wake::Orphaned => self.watch.orphaned = true,
             Wake::Datagram { bytes, from } => {
                 let now = self.clock.now();
                 if !self.link.accepts(from, now) {
@@ -211,6 +217,7 @@ struct Watch {
     on_ground: bool,
     flown: bool,
     disarmed_since: Option<Nanos>,
+    orphaned: bool,
     signals: VecDeque<Nanos>,
     ignored: usize,
 }
@@ -245,6 +252,9 @@ impl Watch {
             if when_landed && self.flown && now.since(since) >= SETTLE {
                 return Some(Exit::Landed);
             }
+            if self.orphaned && now.since(since) >= ORPHAN {
+                return Some(Exit::Orphaned);
+            }
         }
         if self.signals.is_empty() {
             return None;
@@ -275,6 +285,21 @@ mod tests {
 
     fn vehicle(armed: bool, on_ground: bool) -> Watch {
         Watch { armed, on_ground, ..Watch::default() }
+    }
+
+    #[test]
+    fn an_orphan_ends_on_the_ground_but_never_while_armed() {
+        let mut watch = vehicle(false, true);
+        assert_eq!(watch.exit(at(1.0), false), None);
+        assert_eq!(watch.exit(at(60.0), false), None);
+        watch.orphaned = true;
+        assert_eq!(watch.exit(at(60.0), false), Some(Exit::Orphaned));
+        let mut watch = vehicle(true, false);
+        watch.orphaned = true;
+        assert_eq!(watch.exit(at(60.0), false), None);
+        watch.armed = false;
+        assert_eq!(watch.exit(at(61.0), false), None);
+        assert_eq!(watch.exit(at(61.0).plus(ORPHAN), false), Some(Exit::Orphaned));
     }
 
     #[test]

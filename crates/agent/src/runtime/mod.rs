@@ -34,6 +34,8 @@ pub enum Wake {
     Input(Input),
     /// SIGINT or SIGTERM.
     Signal,
+    /// Standard input was closed.
+    Orphaned,
 }
 
 /// Why the agent cannot start.
