@@ -22,10 +22,9 @@ impl Peers {
     /// Takes the bytes of a peer's envelope; what is not a heartbeat of this schema is ignored here.
     pub fn take(&mut self, now: Nanos, bytes: &[u8]) {
         let Ok(envelope) = Envelope::<Up>::from_bytes(bytes) else { return };
-        if let Up::Heartbeat(heartbeat) = envelope.body {
-            if self.heard.len() < MOST || self.heard.contains_key(&heartbeat.drone) {
-                self.heard.insert(heartbeat.drone.clone(), (now, heartbeat));
-            }
+        let Up::Heartbeat(heartbeat) = envelope.body else { return };
+        if self.heard.len() < MOST || self.heard.contains_key(&heartbeat.drone) {
+            self.heard.insert(heartbeat.drone.clone(), (now, heartbeat));
         }
     }
 
