@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fleet import _core
 from fleet.certificate import verify
+from fleet.errors import InputError
 from fleet.generate import line
 from fleet.planner import Status, groups, plan
 from fleet.planner.problem import Problem, problem
+from fleet.planner.result import encoded
 from fleet.planner.schedule import Itinerary, schedules
 from fleet.scenario import Scenario, load
 
@@ -96,3 +99,15 @@ def test_boxes_bound_gaps_and_clearances_from_below(seed: int) -> None:
         for j in range(4):
             distance = np.linalg.norm(inside[i][:, None] - inside[j][None], axis=2).min()
             assert found[i, j] <= distance + 1e-12
+
+
+def test_a_plan_too_large_for_the_wire_is_the_users_to_know() -> None:
+    content = dict(_core.decode_plan(plan(load(SCENARIOS / "hover.toml")).data))
+    assert encoded(content) == _core.encode_plan(content)
+    content["regions"] = content["regions"] * 2000
+    with pytest.raises(InputError, match=f"at most {_core.MAX_BYTES}") as caught:
+        encoded(content)
+    assert caught.value.problems[0].code == "size"
+    content["regions"] = [{"name": "r", "shape": "none"}]
+    with pytest.raises(ValueError, match="unexpected type"):
+        encoded(content)

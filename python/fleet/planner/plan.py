@@ -34,7 +34,8 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     stage. The same scenario gives the same bytes.
 
     Raises InfeasibleError, naming a clause, when the mission cannot hold or nothing was found that
-    keeps the tube's margins; ValueError for an unknown method.
+    keeps the tube's margins; InputError when the plan is too large for the wire; ValueError for an
+    unknown method.
     """
     if method not in ("auto", "convex", "nlp"):
         raise ValueError(f"method is {method!r}; legal are auto, convex and nlp")

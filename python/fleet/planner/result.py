@@ -10,6 +10,8 @@ import numpy as np
 
 from fleet import _core
 from fleet.certificate import Proof, prove
+from fleet.errors import InputError
+from fleet.errors import Problem as Fault
 from fleet.stl.normal import drones_of
 
 from .heading import headings
@@ -160,6 +162,21 @@ def assemble(
     }
 
 
+def encoded(plan: dict[str, Any]) -> bytes:
+    """The plan file.
+
+    Raises InputError when the plan, good as it may be, is larger than what the wire carries.
+    """
+    try:
+        return _core.encode_plan(plan)
+    except ValueError as error:
+        if f"at most {_core.MAX_BYTES} are legal" not in str(error):
+            raise
+        size = f"the plan (rho {plan['rho']:.3f} m) of {len(plan['drones'])} drones is too large"
+        text = f"{size} to be sent: {error}; plan fewer drones at once"
+        raise InputError(text, problems=[Fault("size", "", "drone", text)]) from error
+
+
 def result(
     scenario: Scenario,
     problem: Problem,
@@ -171,7 +188,10 @@ def result(
     int_a2: float,
     timings: dict[str, float],
 ) -> PlanResult:
-    """Certify the trajectories and put everything together; the status follows from the certificate."""
+    """Certify the trajectories and put everything together; the status follows from the certificate.
+
+    Raises InputError when the plan is too large for the wire.
+    """
     clauses = [(c.id, c.formula) for c in scenario.clauses()]
     proof = prove(list(problem.ids), scenario.regions(), clauses, tracks, problem.horizon, problem.sample)
     drones = [drone_plan(scenario, problem, itinerary, d, t) for d, t in enumerate(tracks)]
@@ -181,7 +201,7 @@ def result(
         status = Status.OPTIMAL
     reached = bound if np.isfinite(bound) else proof.rho
     plan |= {"method": method, "status": status.value, "rho_bound": reached}
-    data = _core.encode_plan(plan)
+    data = encoded(plan)
     flown = list(zip(problem.ids, itinerary.stops, strict=True))
     events = [
         {
