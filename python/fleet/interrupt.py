@@ -7,6 +7,7 @@ whenever raising is off, signals are only counted, so that nothing can break int
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +15,33 @@ from types import FrameType
 from typing import Any
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_AGAIN_S = 0.02
+
+
+@contextmanager
+def deliver_again(forget: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """Repeat a Ctrl-C whose KeyboardInterrupt rose where Python drops exceptions.
+
+    The import system runs callbacks of weak references, in which an exception is printed and lost. ``forget``
+    takes the lost signal back before it comes again.
+    """
+    before = sys.unraisablehook
+
+    def hook(lost: sys.UnraisableHookArgs) -> None:
+        if lost.exc_type is not KeyboardInterrupt:
+            before(lost)
+            return
+        forget()
+        # Raised here it would be lost again: this hook is such a place too.
+        timer = threading.Timer(_AGAIN_S, signal.raise_signal, [signal.SIGINT])
+        timer.daemon = True
+        timer.start()
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 @contextmanager
@@ -76,7 +104,8 @@ class Interrupt:
         wanted = [one for one in _SIGNALS if signal.getsignal(one) is not signal.SIG_IGN]
         before = [signal.signal(one, self._on_signal) for one in wanted]
         try:
-            yield
+            with deliver_again(self._forget_one):
+                yield
         finally:
             for one, handler in zip(wanted, before, strict=True):
                 signal.signal(one, handler)
@@ -103,6 +132,10 @@ class Interrupt:
             self._pending = True
         else:
             self._raise()
+
+    def _forget_one(self) -> None:
+        self.count -= 1
+        self.raising = True
 
     def _raise(self) -> None:
         if self.raising:

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+from types import FrameType
 
 
 def main() -> None:
     """Run `fleet` with the arguments of this process; leaves by SystemExit."""
+    # Until the program is loaded there is nothing to clean up, and an exception might be lost in an import.
+    # A signal that our parent has switched off stays off.
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _leave)
     try:
         from fleet.cli.app import run
+        from fleet.interrupt import deliver_again
 
-        code = run(sys.argv[1:])
+        signal.signal(signal.SIGINT, usual)
+        with deliver_again():
+            code = run(sys.argv[1:])
         sys.stdout.flush()
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201 - nothing that could print better is loaded yet
@@ -21,3 +31,8 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
     sys.exit(code)
+
+
+def _leave(_number: int, _frame: FrameType | None) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(130)
