@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from fleet.cli import flight, generate, ground, planning
+from fleet.cli import flight, generate, ground, planning, spec
 from fleet.cli.reply import SETTINGS, usage_error
 
 app = typer.Typer(
@@ -21,6 +21,7 @@ app = typer.Typer(
     "130 interrupted with nothing kept.",
 )
 planning.register(app)
+spec.register(app)
 generate.register(app)
 flight.register(app)
 ground.register(app)
