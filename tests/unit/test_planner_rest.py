@@ -125,8 +125,12 @@ def test_other_branch_where_the_nearer_is_out_of_reach(tmp_path: Path) -> None:
     assert result.assignment == {"d1": [], "d2": ["tr4"]}
 
 
-def test_release_written_as_negated_until(tmp_path: Path) -> None:
-    clauses = ("@r not ((not d1 in tr3) until[0,40] d1 in tr1)", "@t1 eventually[0,40] d1 in tr1")
+@pytest.mark.parametrize(
+    "clause", ["not ((not d1 in tr3) until[0,40] d1 in tr1)", "d1 in tr3 release[0,40] d1 outside tr1"]
+)
+def test_release(tmp_path: Path, clause: str) -> None:
+    """tr1 is closed to the drone until it has been in tr3."""
+    clauses = (f"@r {clause}", "@t1 eventually[0,40] d1 in tr1")
     result = planned(mission(tmp_path, *clauses))
     times, first = sampled(result, "d1", "tr3")
     assert times[first].min() < times[sampled(result, "d1", "tr1")[1]].min()

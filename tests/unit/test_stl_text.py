@@ -38,6 +38,10 @@ def either(*fs):
     return {"op": "or", "fs": list(fs)}
 
 
+def no(f):
+    return {"op": "not", "f": f}
+
+
 def until(left, right, start, end):
     return {"op": "until", "from": start, "to": end, "left": left, "right": right}
 
@@ -80,6 +84,8 @@ def linear(constant, **coefs):
         # Aliases.
         (f"G[0,1] F[2,3] {a}", timed("always", 0.0, 1.0, timed("eventually", 2.0, 3.0, A))),
         (f"{a} U[0,5] {b}", until(A, B, 0.0, 5.0)),
+        (f"{a} release[0,5] {b}", {"op": "not", "f": until(no(A), no(B), 0.0, 5.0)}),
+        (f"{c} or {a} release[1,2] not {b}", either(C, no(until(no(A), no(no(B)), 1.0, 2.0)))),
         # The body of a quantifier reaches to the right as far as it can, also inside always.
         ("all d: d in tr1", both(visit("d1", "tr1"), visit("d2", "tr1"), visit("d3", "tr1"))),
         (

@@ -75,6 +75,12 @@ class Builder(Arithmetic):
         right = self._needed(after, scope, offset + end)
         return {"op": "until", "from": start, "to": end, "left": left, "right": right}
 
+    def _release(self, node: Node, scope: Scope, offset: float) -> Formula:
+        """`f release[a,b] g`, for not (not f until[a,b] not g): g over the window, until f held once."""
+        f = self._until(node, scope, offset)
+        f["left"], f["right"] = ({"op": "not", "f": f[side]} for side in ("left", "right"))
+        return {"op": "not", "f": f}
+
     def _window(self, node: Node, offset: float) -> tuple[float, float]:
         bounds = []
         for child in node.children:

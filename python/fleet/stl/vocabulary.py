@@ -10,7 +10,7 @@ from typing import Any
 Formula = dict[str, Any]
 """A formula in the serde form of `crates/core/src/formula/tree.rs`: `{"op": "always", "from": ...}`."""
 
-_OPERATORS = ("always", "eventually", "until", "G", "F", "U", "not", "and", "or", "all", "some")
+_OPERATORS = ("always", "eventually", "until", "release", "G", "F", "U", "not", "and", "or", "all", "some")
 _PREDICATES = ("in", "outside", "dist", "workspace", "obstacles", "home", "T", "delta_min")
 RESERVED = frozenset((*_OPERATORS, *_PREDICATES))
 """Words with a meaning of their own in formulas; nothing else may be called so."""
