@@ -150,7 +150,9 @@ def describe(body: dict[str, Any]) -> str:
     if what["event"] == "mode":
         return f"{body['drone']}: {what['from']} -> {what['to']}{at} ({body['cause']})"
     words = {key: value for key, value in what.items() if key != "event"}
-    details = "".join(f" {value}" for value in words.values())
+    details = "".join(
+        f" {value:.2f}" if isinstance(value, float) else f" {value}" for value in words.values()
+    )
     return f"{body['drone']}: {what['event']}{details}{at} ({body['cause']})"
 
 

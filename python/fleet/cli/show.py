@@ -76,11 +76,21 @@ def verdict(answer: Reply, plan: Mapping[str, Any], verdict: Verdict) -> None:
     )
 
 
+_HEADS = {
+    "rho": "rho",
+    "rho_planned": "planned",
+    "rho_lower": "certified",
+    "rho_flown": "flown",
+    "t_tightest": "tightest at",
+}
+"""Headings that leave the table readable in 80 columns."""
+
+
 def _clauses(plan: Mapping[str, Any], clauses: list[dict[str, Any]], columns: tuple[str, ...]) -> Table:
     from fleet.certificate import visitors
 
     visits = visitors(plan)
-    table = _table("clause", "kind", "drones", "visited by", *columns)
+    table = _table("clause", "kind", "drones", "visited by", *(_HEADS[column] for column in columns))
     for clause in clauses:
         table.add_row(
             f"@{clause['id']}",
