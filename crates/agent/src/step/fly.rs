@@ -12,6 +12,8 @@ use fleet_core::wire::{EventKind, Mode};
 pub const COAST_AFTER: f64 = 0.1;
 /// A state older than this cannot be bridged: level and descend [s].
 const LOST_AFTER: f64 = 0.3;
+/// Ticks for which it must have been lost before the flight is given up; the descent begins with the first.
+const LOST_TICKS: u32 = 3;
 /// Thrust for a blind descent, relative to hover.
 const SINKING: f64 = 0.95;
 /// Height above the pad [m] or climb [m/s] at which the vehicle has left the ground.
@@ -115,7 +117,10 @@ impl Agent {
             let cause = if lost { "vehicle state is late" } else { "vehicle state is back" };
             self.event(now, EventKind::StateStale { lost }, cause);
         }
-        if matters && age > LOST_AFTER {
+        // An old state in the first tick after a pause of this process tells of the pause: what has arrived
+        // meanwhile is still on its way through the socket (safety.md, 2.2: a fault needs persistence).
+        self.lost_ticks = if matters && age > LOST_AFTER { self.lost_ticks + 1 } else { 0 };
+        if self.lost_ticks > LOST_TICKS {
             self.fire(now, Trigger::StateLost, "vehicle state is lost");
         }
     }

@@ -65,6 +65,7 @@ pub struct Agent {
     /// Distance between state and committed reference [m].
     deviation: Option<f64>,
     state_lost: bool,
+    lost_ticks: u32,
     status: Option<Status>,
     up_seq: u64,
     ticks: u64,
@@ -99,6 +100,7 @@ impl Agent {
             gap: None,
             deviation: None,
             state_lost: false,
+            lost_ticks: 0,
             status: None,
             up_seq: 0,
             ticks: 0,

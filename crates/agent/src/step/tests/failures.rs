@@ -88,6 +88,18 @@ fn a_short_gap_of_the_state_is_bridged() {
 }
 
 #[test]
+fn a_pause_of_the_process_is_not_a_lost_state() {
+    let mut rig = tracking();
+    // The machine stood still, and what arrived meanwhile comes two ticks later.
+    rig.now = rig.now.plus(0.4);
+    rig.sensing = false;
+    rig.run(0.02);
+    rig.sensing = true;
+    rig.run(2.0);
+    assert_eq!(rig.agent.mode, Mode::Track, "{:?}", rig.faults());
+}
+
+#[test]
 fn a_lost_state_ends_in_the_autopilots_landing() {
     let mut rig = tracking();
     rig.sensing = false;
