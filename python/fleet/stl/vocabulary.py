@@ -25,11 +25,18 @@ def is_name(name: str) -> bool:
 
 @dataclass(frozen=True)
 class Clause:
-    """A named conjunct of the mission: its id, its source text and its tree, evaluated at time 0."""
+    """A named conjunct of the mission: its id, its source text and its tree, evaluated at time 0.
+
+    `weight` scales the margin that the planner asks of the clause: with a common slack r it poses
+    rho >= weight * r; the verdict is never weighted. When a mission cannot hold, clauses of smaller
+    `priority` give way first.
+    """
 
     id: str
     text: str
     formula: Formula
+    weight: float = 1.0
+    priority: int = 0
 
 
 @dataclass(frozen=True)
