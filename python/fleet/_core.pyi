@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 SCHEMA: Final = 1
-MAX_BYTES: Final = 262144
+MAX_BYTES: Final = 2097152
 
 _Array: TypeAlias = NDArray[np.float64]
 _Vec3: TypeAlias = tuple[float, float, float]

@@ -104,10 +104,22 @@ def test_boxes_bound_gaps_and_clearances_from_below(seed: int) -> None:
 def test_a_plan_too_large_for_the_wire_is_the_users_to_know() -> None:
     content = dict(_core.decode_plan(plan(load(SCENARIOS / "hover.toml")).data))
     assert encoded(content) == _core.encode_plan(content)
-    content["regions"] = content["regions"] * 2000
+    content["regions"] = content["regions"] * 20000
     with pytest.raises(InputError, match=f"at most {_core.MAX_BYTES}") as caught:
         encoded(content)
     assert caught.value.problems[0].code == "size"
     content["regions"] = [{"name": "r", "shape": "none"}]
     with pytest.raises(ValueError, match="unexpected type"):
         encoded(content)
+
+
+def test_thirty_two_drones_and_sixty_four_targets_are_one_certified_plan(tmp_path: Path) -> None:
+    path = tmp_path / "sixteen.toml"
+    path.write_text(line(16, 1))
+    found = plan(load(path))
+    assert found.status is Status.OPTIMAL
+    assert found.rho_lower >= 0.95 * found.rho_bound
+    assert len(found.bytes) <= _core.MAX_BYTES
+    assert sorted(r for order in found.assignment.values() for r in order) == sorted(
+        f"tr{k}" for k in range(1, 65)
+    )

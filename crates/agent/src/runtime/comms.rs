@@ -182,7 +182,7 @@ impl Comms {
             return;
         }
         let bytes = sample.payload().to_bytes();
-        if bytes.len() <= wire::MAX_BYTES {
+        if bytes.len() <= PEER_BYTES {
             let _ = self.wake.offer(Wake::Input(Input::Peer { bytes: bytes.into_owned() }));
         }
     }
@@ -213,6 +213,8 @@ impl Comms {
 
 /// Room for the header around a plan of the largest size.
 const ENVELOPE: usize = 4096;
+/// Largest message of a peer [bytes]: a replan notice of 512 segments takes a quarter of it.
+const PEER_BYTES: usize = 256 * 1024;
 
 fn known(status: &Shared) -> Result<Status, String> {
     let status = status.lock().unwrap_or_else(PoisonError::into_inner);

@@ -5,8 +5,9 @@ use serde::{Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
-/// Largest message or plan file [bytes] (design.md, Wire).
-pub const MAX_BYTES: usize = 256 * 1024;
+/// Largest message or plan file [bytes]: the largest fleet, 64 drones on a line of 32 towers, takes 1.3 MB
+/// (design.md, Wire).
+pub const MAX_BYTES: usize = 2 * 1024 * 1024;
 /// Deepest nesting of lists and maps in a message; bounds the stack on hostile input.
 pub const MAX_DEPTH: usize = 64;
 
@@ -14,7 +15,7 @@ pub const MAX_DEPTH: usize = 64;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DecodeError {
     /// Larger than [`MAX_BYTES`].
-    #[error("{0} bytes; at most 262144 are legal")]
+    #[error("{0} bytes; at most 2097152 are legal")]
     TooLarge(usize),
     /// Not CBOR of the expected shape, or a value is not legal.
     #[error("not a valid message: {0}")]
