@@ -1,4 +1,4 @@
-"""`fleet generate`: scenario files made by rule."""
+"""`fleet generate`: scenario files made by rule, and their JSON Schema."""
 
 from __future__ import annotations
 
@@ -11,12 +11,35 @@ from fleet import files
 from fleet.cli.reply import Json, reply
 from fleet.faults import bad_input
 
-group = typer.Typer(no_args_is_help=True, help="Make scenario files by rule.")
+group = typer.Typer(no_args_is_help=True, help="Make scenario files by rule, or their JSON Schema.")
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this module."""
     app.add_typer(group, name="generate")
+
+
+@group.command("schema")
+def schema(
+    output: Annotated[Path, typer.Option("-o", "--output", help="JSON file to write.")],
+    as_json: Json = False,
+) -> None:
+    """Write the JSON Schema of scenario files, with which editors complete and check them.
+
+    Name it in the first line of a scenario: #:schema scenario.schema.json
+
+    Example: fleet generate schema -o scenario.schema.json
+    """
+    with reply("generate", as_json=as_json, keys=("file",)) as answer:
+        from fleet.scenario import schema as document
+
+        if output.suffix != ".json":
+            raise bad_input(
+                "file", "is not a schema's name; it must end in .json", file=str(output), field="--output"
+            )
+        files.write_atomic(output, document.text().encode())
+        answer.fields["file"] = str(output)
+        answer.say(f"{output}: JSON Schema of scenario files")
 
 
 @group.command("line")

@@ -68,6 +68,12 @@ class Planner(Table):
 class Prism(Table):
     """Upright prism: `base` corners, or `center`, `apothem` and `sides` of a regular one; and `z`."""
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [{"required": ["base"]}, {"required": ["center", "apothem", "sides"]}],
+        }
+    )
+
     z: Interval
     base: list[Vec2] | None = None
     center: Vec2 | None = None
@@ -99,8 +105,15 @@ class Polyhedron(Table):
         return self
 
 
+def _exactly(*shapes: str) -> ConfigDict:
+    """JSON Schema of a table that has exactly one of some keys."""
+    return ConfigDict(json_schema_extra={"oneOf": [{"required": [key]} for key in shapes]})
+
+
 class Shape(Table):
     """Exactly one of `box = [[lo], [hi]]`, `prism = {...}`, `polyhedron = {A, b}` [m]."""
+
+    model_config = _exactly("box", "prism", "polyhedron")
 
     box: Corners | None = None
     prism: Prism | None = None
