@@ -1,12 +1,14 @@
-"""The planner from end to end: scenario to certified plan."""
+"""The planner from end to end: scenario to certified plan, and to better ones while there is time."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from fleet.errors import InfeasibleError
+from fleet import _core
+from fleet.errors import InfeasibleError, InputError
 
 from . import convex, groups
 from .ceiling import rho_bound
@@ -18,6 +20,7 @@ from .sketch import sketched
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
 
+#: Called with the stage and the robustness reached in it [m]; what it raises ends the planning.
 Progress = Callable[[str, float], None]
 
 #: Planning methods by name.
@@ -26,8 +29,50 @@ METHODS: dict[str, groups.Method] = {"convex": groups.steps, "nlp": groups.nonli
 WIDEST = 5.0
 
 
+@dataclass(frozen=True)
+class Attempt:
+    """One thing to try: an itinerary of a problem, how to fly it, and the name of that method."""
+
+    task: Problem
+    way: Itinerary
+    method: str
+    run: groups.Method
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A plan that satisfies the mission, the attempt that made it, and its trajectories."""
+
+    result: PlanResult
+    attempt: Attempt
+    tracks: list[_core.Trajectory]
+
+
+@dataclass
+class Watch:
+    """Where the time went [s]; `mark` is the end of the last part."""
+
+    spent: dict[str, float] = field(
+        default_factory=lambda: (
+            {"process": time.process_time()} | dict.fromkeys(("route", "build", "solve", "certify"), 0.0)
+        )
+    )
+    mark: float = field(default_factory=time.perf_counter)
+
+    def lap(self, part: str) -> None:
+        """Count the time since the last lap for `part`."""
+        now = time.perf_counter()
+        self.spent[part] += now - self.mark
+        self.mark = now
+
+    def move(self, seconds: float, one: str, other: str) -> None:
+        """Count some of the time of `one` for `other`."""
+        self.spent[one] -= seconds
+        self.spent[other] += seconds
+
+
 def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = "auto") -> PlanResult:
-    """Plan a scenario: assign, route, optimise, certify.
+    """Plan a scenario: assign, route, optimise, certify; the first plan that satisfies it.
 
     `method` is "convex" (sequential convex steps), "nlp" (the nonlinear program, IPOPT) or "auto":
     convex, then the nonlinear program where that fails. `progress(stage, rho)` is called at every
@@ -37,37 +82,49 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     keeps the tube's margins; InputError when the plan is too large for the wire; ValueError for an
     unknown method.
     """
-    if method not in ("auto", "convex", "nlp"):
-        raise ValueError(f"method is {method!r}; legal are auto, convex and nlp")
+    return next(improving(scenario, progress=progress, method=method))
+
+
+def improving(
+    scenario: Scenario, *, progress: Progress | None = None, method: str = "auto"
+) -> Iterator[PlanResult]:
+    """Certified plans, each better than the one before; the first is the one of `plan`.
+
+    Raises as `plan` does.
+    """
+    if method != "auto" and method not in METHODS:
+        raise ValueError(f"method is {method!r}; legal are {', '.join(('auto', *METHODS))}")
     tell = progress or (lambda stage, rho: None)
-    timings = {"process": time.process_time()}
-    mark = time.perf_counter()
+    watch = Watch()
     task = problem(scenario)
     bound = rho_bound(task)
-    timings |= dict.fromkeys(("route", "build", "solve", "certify"), 0.0)
     tell("route", bound)
     ways, refusal = itineraries(task, min(bound, WIDEST))
-    timings["route"], mark = lap(mark, timings["route"])
-    for way, used in attempts(task, ways, method):
-        tell("build", bound)
-        flight = groups.fly(task, way, min(bound, WIDEST), METHODS[used], progress)
-        timings["build"] += flight.build_s
-        timings["solve"], mark = lap(mark, timings["solve"] - flight.build_s)
-        margins = flight.margins
-        why = refuse(task, margins)
-        if why is not None:
-            refusal = refusal or why
+    watch.lap("route")
+    best: Certified | None = None
+    for one in attempts(task, ways, method):
+        try:
+            found = attempt(scenario, one, bound, watch, tell)
+        except InfeasibleError as error:
+            refusal = refusal or error
             continue
-        tell("certify", margins.r)
-        energy, tracks = flight.int_a2, flight.tracks
-        out = result(scenario, task, way, tracks, bound=bound, method=used, int_a2=energy, timings=timings)
-        timings["certify"], mark = lap(mark, timings["certify"])
-        why = broken(out)
-        if why is None:
-            return out
-        refusal = refusal or why
-    assert refusal is not None, "there is always an attempt, or schedules raises"
-    raise refusal
+        except InputError:
+            if best is None:
+                raise
+            continue  # a further plan that the wire does not carry
+        if best is None or better(found.result, best.result):
+            best = found
+            yield found.result
+    if best is None:
+        assert refusal is not None, "there is always an attempt, or schedules raises"
+        raise refusal
+
+
+def better(a: PlanResult, b: PlanResult) -> bool:
+    """Whether plan a is better than plan b: by status, then rho to 1 mm, then the integral of |a|^2."""
+    ranks = ("violated", "certified", "optimal")
+    one, other = ((ranks.index(p.status), round(p.rho, 3), -p.int_a2) for p in (a, b))
+    return one > other
 
 
 def itineraries(task: Problem, bound: float) -> tuple[list[Itinerary], InfeasibleError | None]:
@@ -81,42 +138,60 @@ def itineraries(task: Problem, bound: float) -> tuple[list[Itinerary], Infeasibl
         return list(schedules(task, bound)), error
 
 
-def attempts(task: Problem, ways: list[Itinerary], method: str) -> Iterator[tuple[Itinerary, str]]:
+def attempts(task: Problem, ways: list[Itinerary], method: str) -> Iterator[Attempt]:
     """Itineraries and methods in the order in which they are tried."""
-    if method != "auto":
-        yield from ((way, method) for way in ways)
-    else:
-        yield from ((way, "convex") for way in ways)
-        yield ways[0], "nlp"
+    name = "convex" if method == "auto" else method
+    yield from (Attempt(task, way, name, METHODS[name]) for way in ways)
+    if method == "auto":
+        yield Attempt(task, ways[0], "nlp", METHODS["nlp"])
 
 
-def lap(mark: float, spent: float) -> tuple[float, float]:
-    """`spent` and the seconds since `mark`, and the new mark."""
-    now = time.perf_counter()
-    return spent + now - mark, now
+def attempt(scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: Progress) -> Certified:
+    """Fly one attempt and certify it.
+
+    Raises InfeasibleError when limits or margins are not kept or a clause is not proved; InputError when
+    the plan is too large for the wire.
+    """
+    tell("build", bound)
+    flight = groups.fly(one.task, one.way, min(bound, WIDEST), one.run, tell)
+    watch.lap("solve")
+    watch.move(flight.build_s, "solve", "build")
+    refuse(one.task, flight.margins)
+    tell("certify", flight.margins.r)
+    out = result(
+        scenario,
+        one.task,
+        one.way,
+        flight.tracks,
+        bound=bound,
+        method=one.method,
+        int_a2=flight.int_a2,
+        timings=watch.spent,
+    )
+    watch.lap("certify")
+    refuse_broken(out)
+    return Certified(replace(out, timings=dict(watch.spent)), one, flight.tracks)
 
 
-def refuse(task: Problem, margins: convex.Margins) -> InfeasibleError | None:
-    """Why trajectories do not do: limits or the margins of the tube are not kept; None when they are."""
+def refuse(task: Problem, margins: convex.Margins) -> None:
+    """Raises InfeasibleError when limits or the margins of the tube are not kept."""
     if margins.share > 1:
         limits = f"v_max = {task.v_max:g} m/s and a_max = {task.a_max:g} m/s^2"
         text = f"{limits} cannot be kept: the best found passes one by {100 * (margins.share - 1):.1f} %"
-        return InfeasibleError(text, clause=margins.clause)
+        raise InfeasibleError(text, clause=margins.clause)
     if margins.tube < -1e-6:
         asked = f"{task.tube:g} m (pairs {2 * task.tube:g} m and more with closing speed)"
         text = f"the best margin found is {margins.tube + task.tube:.2f} m, and the tube asks for {asked}"
-        return InfeasibleError(text, clause=margins.short)
-    return None
+        raise InfeasibleError(text, clause=margins.short)
 
 
-def broken(found: PlanResult) -> InfeasibleError | None:
-    """Why a plan does not do although it keeps limits and margins: a clause of it is not proved.
+def refuse_broken(found: PlanResult) -> None:
+    """Raises InfeasibleError when a plan keeps limits and margins but a clause of it is not proved.
 
     The margins of clauses without a normal form are those of chosen witnesses; the certificate decides.
     """
     worst = min(found.plan["clauses"], key=lambda clause: clause["result"]["rho_lower"])
     rho = float(worst["result"]["rho_lower"])
-    if rho > 0:
-        return None
-    text = f"the best robustness found is {rho:.2f} m, and the mission asks for more than 0"
-    return InfeasibleError(text, clause=worst["id"])
+    if rho <= 0:
+        text = f"the best robustness found is {rho:.2f} m, and the mission asks for more than 0"
+        raise InfeasibleError(text, clause=worst["id"])
