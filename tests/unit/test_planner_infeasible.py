@@ -95,5 +95,5 @@ def test_clause_without_normal_form_that_cannot_hold(tmp_path: Path) -> None:
 
 
 def test_unknown_method(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="legal are auto, convex and nlp"):
+    with pytest.raises(ValueError, match="legal are auto, convex, nlp"):
         plan(load(SCENARIOS / "hover.toml"), method="magic")
