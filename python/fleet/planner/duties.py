@@ -10,7 +10,7 @@ import numpy as np
 from . import clearance as near
 from .knots import Array, Grid, Pieces, cut, merge, refine
 from .problem import Problem
-from .rows import Block, half_spaces, separation
+from .rows import Block, half_spaces, joined, separation
 from .signals import Signals, positions
 from .spec import Invariant, Specification, predicate
 from .witness import Duty, choose
@@ -71,8 +71,8 @@ class Sum:
             half_spaces(p, np.tile(n, (m, 1)), np.zeros(m))
             for p, n in zip(self.pieces, self.factors, strict=True)
         ]
-        vals, cols = np.hstack([b.vals for b in parts]), np.hstack([b.cols for b in parts])
-        yield Block(vals, cols, np.full(len(vals), self.constant), np.ones(len(vals)))
+        rows = len(parts[0].vals)
+        yield joined(parts, np.full(rows, self.constant), np.ones(rows))
 
 
 @dataclass

@@ -6,7 +6,7 @@ A row reads `vals . x[cols] + rho * r <= rhs` with r the common slack [m] that t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
 
@@ -17,13 +17,34 @@ from .knots import Array, Grid, Ints, Pieces, difference, hermite
 
 
 @dataclass(frozen=True)
+class Pull:
+    """Where rows come from: row 6 i + j is `ways[i] . control point j of piece i`; `ways` (m, 3)."""
+
+    pieces: Pieces
+    ways: Array
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where rows come from: control points of a derivative (segment, point, axis), first plus, then minus."""
+
+    drone: int
+    segments: Ints
+    order: int
+
+
+@dataclass(frozen=True)
 class Block:
-    """Rows of one width: `vals` and `cols` (r, w), `rhs` and `rho` (r,)."""
+    """Rows of one width: `vals` and `cols` (r, w), `rhs` and `rho` (r,).
+
+    `origin` tells what the rows are sums of where they depend on the times of knots (slopes.py).
+    """
 
     vals: Array
     cols: Ints
     rhs: Array
     rho: Array
+    origin: tuple[Pull, ...] | Limit = ()
 
 
 def half_spaces(pieces: Pieces, normals: Array, offsets: Array, rho: float = 1.0) -> Block:
@@ -31,14 +52,21 @@ def half_spaces(pieces: Pieces, normals: Array, offsets: Array, rho: float = 1.0
     m = len(pieces.start)
     vals = -np.einsum("mij,ma->mija", pieces.maps, normals).reshape(6 * m, 18)
     cols = np.repeat(pieces.columns, 6, axis=0)
-    return Block(vals, cols, -np.repeat(offsets, 6), np.full(6 * m, rho))
+    return Block(vals, cols, -np.repeat(offsets, 6), np.full(6 * m, rho), (Pull(pieces, -normals),))
 
 
 def separation(a: Pieces, b: Pieces, normals: Array, offsets: Array, rho: float = 1.0) -> Block:
     """Rows `n . (c_a - c_b) >= offset + rho r` on the control points of pieces over the same times."""
     one = half_spaces(a, normals, offsets, rho)
     two = half_spaces(b, -normals, offsets, rho)
-    return Block(np.hstack([one.vals, two.vals]), np.hstack([one.cols, two.cols]), one.rhs, one.rho)
+    return joined([one, two], one.rhs, one.rho)
+
+
+def joined(parts: Sequence[Block], rhs: Array, rho: Array) -> Block:
+    """Rows that are sums of the rows of `parts`, which come from pieces."""
+    origin = [pull for b in parts if not isinstance(b.origin, Limit) for pull in b.origin]
+    vals, cols = np.hstack([b.vals for b in parts]), np.hstack([b.cols for b in parts])
+    return Block(vals, cols, rhs, rho, tuple(origin))
 
 
 def knot_inside(grid: Grid, drone: int, knot: int, faces: Array, rho: float = 1.0) -> Block:
@@ -75,7 +103,8 @@ def limits(grid: Grid, drone: int, segments: Ints, order: int, bound: float) -> 
     vals = np.broadcast_to(maps[:, :, None, :], (m, k, 3, 6)).reshape(-1, 6)
     flat = cols.reshape(-1, 6)
     rhs = np.full(2 * len(vals), bound)
-    return Block(np.vstack([vals, -vals]), np.vstack([flat, flat]), rhs, np.zeros(2 * len(vals)))
+    origin = Limit(drone, segments, order)
+    return Block(np.vstack([vals, -vals]), np.vstack([flat, flat]), rhs, np.zeros(2 * len(vals)), origin)
 
 
 def derivative_points(grid: Grid, x: Array, drone: int, order: int) -> Array:
@@ -93,7 +122,7 @@ def gram(degree: int) -> Array:
     return np.asarray(w) / (2 * n + 1)
 
 
-def energy(grid: Grid, weights: dict[int, float]) -> sparse.csc_matrix:
+def energy(grid: Grid, weights: Mapping[int, float]) -> sparse.csc_matrix:
     """P with `x' P x / 2 = sum over orders of weight * integral |d^order p|^2 dt`, all drones."""
     rows, cols, vals = [], [], []
     for d, times in enumerate(grid.times):

@@ -56,7 +56,11 @@ def knot_times(problem: Problem, itinerary: Itinerary, drone: int) -> Array:
 def setup(problem: Problem, itinerary: Itinerary, bound: float) -> Setup:
     """Grid, equalities and visit rows of an itinerary."""
     drones = range(len(problem.ids))
-    grid = Grid(tuple(knot_times(problem, itinerary, d) for d in drones))
+    return on_grid(problem, itinerary, Grid(tuple(knot_times(problem, itinerary, d) for d in drones)), bound)
+
+
+def on_grid(problem: Problem, itinerary: Itinerary, grid: Grid, bound: float) -> Setup:
+    """Equalities and visit rows of an itinerary on given knots, which its visits are among."""
     visits = list(visit_rows(problem, itinerary, grid))
     return Setup(problem, itinerary, grid, list(ends(problem, grid)), visits, bound)
 
@@ -111,7 +115,7 @@ def warm_start(setup: Setup) -> Array:
     quadratic = energy(grid, {3: 0.02, 2: 0.01}) + sparse.diags(weight)
     matrix, rhs = stack(setup.equal, grid.size)
     none = sparse.csc_matrix((0, grid.size)), np.zeros(0)
-    x = solve(quadratic, -wanted, (matrix[:, : grid.size], rhs), none)
-    if x is None:
+    found = solve(quadratic, -wanted, (matrix[:, : grid.size], rhs), none)
+    if found is None:
         raise RuntimeError("the warm start, a least-squares problem, was not solved")
-    return x
+    return found.x

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
 
@@ -13,13 +15,22 @@ MAX_ITERATIONS = 100
 ROW_TOLERANCE = 1e-6
 
 
+@dataclass(frozen=True)
+class Solution:
+    """Minimiser `x`, multipliers `z` >= 0 of the rows `G x <= h`, and the value of the objective."""
+
+    x: Array
+    z: Array
+    value: float
+
+
 def solve(
     quadratic: sparse.csc_matrix,
     linear: Array,
     equal: tuple[sparse.csc_matrix, Array],
     below: tuple[sparse.csc_matrix, Array],
-) -> Array | None:
-    """Minimiser of `x' P x / 2 + q' x` with `A x = b` and `G x <= h`; None unless solved and checked."""
+) -> Solution | None:
+    """Minimum of `x' P x / 2 + q' x` with `A x = b` and `G x <= h`; None unless solved and checked."""
     import clarabel
 
     settings = clarabel.DefaultSettings()
@@ -36,4 +47,6 @@ def solve(
     x = np.asarray(outcome.x)
     residual = np.abs(equal[0] @ x - equal[1]).max(initial=0.0)
     excess = (below[0] @ x - below[1]).max(initial=0.0)
-    return x if max(residual, excess) <= ROW_TOLERANCE and np.isfinite(x).all() else None
+    if max(residual, excess) > ROW_TOLERANCE or not np.isfinite(x).all():
+        return None
+    return Solution(x, np.asarray(outcome.z)[len(equal[1]) :], float(outcome.obj_val))
