@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,7 +25,7 @@ PLAN_KEYS = (
     "time_s", "int_a2", "energy_J", "conflict",
 )  # fmt: skip
 """Keys that `plan --json` adds (design.md, --json)."""
-METHODS = ("auto", "convex", "nlp")
+METHODS = ("auto", "convex", "nlp", "rrt")
 ScenarioArgument = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (.toml).")]
 
 
@@ -41,7 +42,9 @@ def plan(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the plan to this file.")
     ] = None,
-    method: Annotated[str, typer.Option(help="How to plan: auto, convex or nlp.")] = "auto",
+    method: Annotated[
+        str, typer.Option(help="How to plan: auto, convex, nlp, or rrt (a baseline: kinodynamic RRT*).")
+    ] = "auto",
     as_json: Json = False,
 ) -> None:
     """Plan a mission and prove that the plan satisfies it.
@@ -74,7 +77,9 @@ def make_plan(answer: Reply, scenario: Scenario, method: str = "auto") -> PlanRe
     try:
         with spinner(answer.err, f"planning {scenario.name}") as tell:
             return planner.plan(
-                scenario, method=method, progress=lambda stage, rho: tell(f"{stage}, rho {rho:.2f} m")
+                scenario,
+                method=method,
+                progress=lambda stage, rho: tell(stage if isnan(rho) else f"{stage}, rho {rho:.2f} m"),
             )
     except InfeasibleError as error:
         if "conflict" in answer.fields:

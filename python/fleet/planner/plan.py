@@ -11,6 +11,7 @@ from fleet import _core
 from fleet.errors import InfeasibleError, InputError
 
 from . import convex, groups
+from .baseline import BASELINES
 from .ceiling import rho_bound
 from .problem import Problem, problem
 from .result import PlanResult, result
@@ -75,8 +76,9 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     """Plan a scenario: assign, route, optimise, certify; the first plan that satisfies it.
 
     `method` is "convex" (sequential convex steps), "nlp" (the nonlinear program, IPOPT) or "auto":
-    convex, then the nonlinear program where that fails. `progress(stage, rho)` is called at every
-    stage. The same scenario gives the same bytes.
+    convex, then the nonlinear program where that fails; or a baseline, "rrt", whose plan is returned
+    even if it violates the mission. `progress(stage, rho)` is called at every stage. The same scenario
+    gives the same bytes.
 
     Raises InfeasibleError, naming a clause, when the mission cannot hold or nothing was found that
     keeps the tube's margins; InputError when the plan is too large for the wire; ValueError for an
@@ -92,8 +94,8 @@ def improving(
 
     Raises as `plan` does.
     """
-    if method != "auto" and method not in METHODS:
-        raise ValueError(f"method is {method!r}; legal are {', '.join(('auto', *METHODS))}")
+    if method not in ("auto", *METHODS, *BASELINES):
+        raise ValueError(f"method is {method!r}; legal are {', '.join(('auto', *METHODS, *BASELINES))}")
     tell = progress or (lambda stage, rho: None)
     watch = Watch()
     task = problem(scenario)
@@ -101,6 +103,9 @@ def improving(
     tell("route", bound)
     ways, refusal = itineraries(task, min(bound, WIDEST))
     watch.lap("route")
+    if method in BASELINES:
+        yield baseline(scenario, task, ways[0], method, bound, watch, tell)
+        return
     best: Certified | None = None
     for one in attempts(task, ways, method):
         try:
@@ -118,6 +123,26 @@ def improving(
     if best is None:
         assert refusal is not None, "there is always an attempt, or schedules raises"
         raise refusal
+
+
+def baseline(
+    scenario: Scenario, task: Problem, way: Itinerary, method: str, bound: float, watch: Watch, tell: Progress
+) -> PlanResult:
+    """The plan of a baseline, certified or violated."""
+    flown = BASELINES[method](scenario, task, way, tell)
+    watch.lap("solve")
+    out = result(
+        scenario,
+        task,
+        flown.way,
+        flown.tracks,
+        bound=bound,
+        method=method,
+        int_a2=flown.int_a2,
+        timings=watch.spent,
+    )
+    watch.lap("certify")
+    return replace(out, timings=dict(watch.spent))
 
 
 def better(a: PlanResult, b: PlanResult) -> bool:

@@ -177,6 +177,12 @@ def encoded(plan: dict[str, Any]) -> bytes:
         raise InputError(text, problems=[Fault("size", "", "drone", text)]) from error
 
 
+def timely(itinerary: Itinerary) -> bool:
+    """Whether every visit is in its window: a drone that only passes there in time has not done it."""
+    stops = [s for stops in itinerary.stops for s in stops]
+    return all(s.visit.window[0] - 1e-6 <= s.t <= s.visit.window[1] + 1e-6 for s in stops)
+
+
 def result(
     scenario: Scenario,
     problem: Problem,
@@ -196,7 +202,7 @@ def result(
     proof = prove(list(problem.ids), scenario.regions(), clauses, tracks, problem.horizon, problem.sample)
     drones = [drone_plan(scenario, problem, itinerary, d, t) for d, t in enumerate(tracks)]
     plan = assemble(scenario, problem, drones, proof)
-    status = Status.CERTIFIED if proof.rho_lower > 0 else Status.VIOLATED
+    status = Status.CERTIFIED if proof.rho_lower > 0 and timely(itinerary) else Status.VIOLATED
     if status is Status.CERTIFIED and proof.rho >= bound - AT_BOUND:
         status = Status.OPTIMAL
     reached = bound if np.isfinite(bound) else proof.rho
