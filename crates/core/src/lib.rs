@@ -11,6 +11,7 @@ pub mod formula;
 pub mod geometry;
 pub mod hover;
 pub mod monitor;
+pub mod power;
 pub mod replan;
 pub mod trajectory;
 pub mod types;

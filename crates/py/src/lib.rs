@@ -4,6 +4,7 @@ mod convert;
 mod formula;
 mod geometry;
 mod keys;
+mod power;
 mod trajectory;
 mod wire;
 
@@ -20,6 +21,8 @@ mod _core {
     use crate::geometry::{inside, outside};
     #[pymodule_export]
     use crate::keys::{is_name, key_alive, key_down, key_query, key_up};
+    #[pymodule_export]
+    use crate::power::{flight_power, hover_power};
     #[pymodule_export]
     use crate::trajectory::Trajectory;
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! Piecewise quintic trajectories as arrays.
 
 use crate::convert::{from_python, to_python, value_error};
+use fleet_core::power::Vehicle;
 use fleet_core::trajectory::{self, Knot};
 use fleet_core::types::Vec3;
 use numpy::ndarray::Array2;
@@ -113,6 +114,12 @@ impl Trajectory {
     fn bounds<'py>(&self, py: Python<'py>) -> Bounds<'py> {
         let (v, a) = self.0.bounds();
         (v.as_slice().to_pyarray(py), a.as_slice().to_pyarray(py))
+    }
+
+    /// Electrical energy [J] of flying it in still air, and of hovering for as long (see `flight_power`).
+    fn energy(&self) -> (f64, f64) {
+        let energy = Vehicle::F450.energy(&self.0);
+        (energy.total, energy.hover)
     }
 
     fn __repr__(&self) -> String {

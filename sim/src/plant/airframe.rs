@@ -1,5 +1,6 @@
 //! Physical constants of the simulated airframe, each with its source.
 
+use fleet_core::power::Vehicle;
 use fleet_core::types::{GRAVITY, Vec3};
 
 /// Constants of a quadrotor in X configuration.
@@ -27,16 +28,14 @@ pub struct Airframe {
     pub rotor_span: f64,
 }
 
-/// Radius of the F450's propellers [m]: `propulsion.prop_radius` of the source below.
-const PROP_RADIUS: f64 = 0.11;
 /// Arm length of the F450 [m]: `arm_length` of the source below.
 const ARM: f64 = 0.225;
 /// Height of the F450's body [m]: `body_height` of the source below.
 const BODY_HEIGHT: f64 = 0.1;
-/// Mass of the F450 with payload and battery [kg]: `mass` of the source below.
-const MASS: f64 = 1.7;
-/// Thrust of a motor for each rpm^2 [N]: `propulsion.force_constant` of the source below.
-const THRUST_PER_RPM2: f64 = 1.2216e-7;
+/// What its power is reckoned from is flown too.
+const F450: Vehicle = Vehicle::F450;
+/// Mass with payload and battery [kg].
+const MASS: f64 = F450.mass;
 /// Largest motor speed [rpm]: `propulsion.rpm.max` of the source below.
 const RPM_MAX: f64 = 9068.0;
 /// One revolution per minute in rad/s.
@@ -56,17 +55,14 @@ impl Airframe {
             MASS * (3.0 * ARM * ARM + BODY_HEIGHT * BODY_HEIGHT) / 12.0,
             MASS * ARM * ARM / 2.0,
         ),
-        motor_thrust_max: THRUST_PER_RPM2 * RPM_MAX * RPM_MAX,
+        motor_thrust_max: F450.rotor.thrust_per_speed2 * (RPM_MAX * RPM) * (RPM_MAX * RPM),
         // `motor_time_constant`; there it acts on the speed, here on the thrust.
         motor_lag: 0.03,
-        // `propulsion.moment_constant` times three propeller radii, as in the allocation matrix.
-        torque_per_thrust: 0.07 * 3.0 * PROP_RADIUS,
-        thrust_per_speed2: THRUST_PER_RPM2 / (RPM * RPM),
-        // `air_resistance_coeff` times the area pi arm^2.
-        drag: 0.30 * std::f64::consts::PI * ARM * ARM,
-        // `rotorDragCoefficient` of PX4's Gazebo model x500, whose propellers are of like size.
-        rotor_drag: 8.064_28e-5,
-        rotor_span: 2.0 * (ARM + PROP_RADIUS),
+        torque_per_thrust: F450.rotor.torque_per_thrust,
+        thrust_per_speed2: F450.rotor.thrust_per_speed2,
+        drag: F450.drag,
+        rotor_drag: F450.rotor.drag,
+        rotor_span: 2.0 * (ARM + F450.rotor.radius),
     };
 
     /// Collective thrust at hover, 0 to 1 of the largest.
