@@ -17,8 +17,8 @@ Ints = NDArray[np.int64]
 
 #: Entries of one knot: position, velocity, acceleration, three axes each.
 KNOT = 9
-#: Two times nearer than this are one [s].
-SAME_TIME = 1e-9
+#: A time nearer to a knot than this is that of the knot [s].
+SAME_KNOT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Grid:
         """Index of the knot of `drone` at time `t` [s]; the caller placed a knot there."""
         times = self.times[drone]
         k = int(np.argmin(np.abs(times - t)))
-        if abs(times[k] - t) > 1e-6:
+        if abs(times[k] - t) > SAME_KNOT:
             raise ValueError(f"drone {drone} has no knot at {t} s")
         return k
 
@@ -129,7 +129,7 @@ def refine(times: Array, parts: int) -> Array:
 def merge(*times: Array) -> Array:
     """Common refinement of several rising lists of times [s]."""
     union = np.sort(np.concatenate(times))
-    keep = np.append(True, np.diff(union) > 1e-6)
+    keep = np.append(True, np.diff(union) > SAME_KNOT)
     return np.asarray(union[keep])
 
 
@@ -143,12 +143,30 @@ def difference(order: int) -> Array:
 
 def sample(grid: Grid, x: Array, drone: int, times: Array) -> Array:
     """Positions (m, 3) [m] of `drone` at `times` (m,) [s]."""
+    points, _, s = located(grid, x, drone, times)
+    return value(points, s)
+
+
+def states(grid: Grid, x: Array, drone: int, times: Array) -> Array:
+    """Position, velocity and acceleration (m, 3, 3) of `drone` at `times` (m,) [s]."""
+    points, h, s = located(grid, x, drone, times)
+    out = [value(difference(k) @ points, s) / h[:, None] ** k for k in range(3)]
+    return np.stack(out, axis=1)
+
+
+def located(grid: Grid, x: Array, drone: int, times: Array) -> tuple[Array, Array, Array]:
+    """Control points (m, 6, 3) and duration (m,) of the segments at `times`, and the places (m,) in them."""
     knots = grid.times[drone]
     seg = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
     h = np.diff(knots)[seg]
-    s = np.clip((times - knots[seg]) / h, 0.0, 1.0)
     columns = grid.offsets[drone] + KNOT * seg[:, None] + np.arange(2 * KNOT)[None, :]
-    c = hermite(h) @ x[columns].reshape(len(times), 6, 3)
-    for _ in range(5):
-        c = c[:, :-1] * (1 - s)[:, None, None] + c[:, 1:] * s[:, None, None]
+    points = hermite(h) @ x[columns].reshape(len(times), 6, 3)
+    return points, h, np.clip((times - knots[seg]) / h, 0.0, 1.0)
+
+
+def value(points: Array, s: Array) -> Array:
+    """Values (m, 3) at `s` (m,) of curves with control points (m, k, 3) (de Casteljau)."""
+    c, u = points, s[:, None, None]
+    while c.shape[1] > 1:
+        c = c[:, :-1] * (1 - u) + c[:, 1:] * u
     return np.asarray(c[:, 0])

@@ -35,15 +35,21 @@ class Setup:
     bound: float
 
 
-def knot_times(problem: Problem, itinerary: Itinerary, drone: int) -> Array:
-    """Knots of one drone: at its visits, at ends of windows of its invariants, and evenly between."""
-    marks = {0.0, problem.horizon}
-    for stop in itinerary.stops[drone]:
-        marks |= {stop.t, stop.t + stop.visit.dwell}
+def marks(problem: Problem, drone: int) -> set[float]:
+    """Times [s] at which a drone has a knot whenever its visits are: ends of windows of its invariants."""
+    found = {0.0, problem.horizon}
     for inv in problem.spec.invariants:
         if problem.ids[drone] in inv.drones:
-            marks |= set(inv.window)
-    fixed_times = np.array(sorted(round(t, 9) for t in marks if -1e-9 <= t <= problem.horizon + 1e-9))
+            found |= {t for t in inv.window if 0.0 <= t <= problem.horizon}
+    return found
+
+
+def knot_times(problem: Problem, itinerary: Itinerary, drone: int) -> Array:
+    """Knots of one drone: at its visits, at ends of windows of its invariants, and evenly between."""
+    points = marks(problem, drone)
+    for stop in itinerary.stops[drone]:
+        points |= {stop.t, stop.t + stop.visit.dwell}
+    fixed_times = np.array(sorted(round(t, 9) for t in points if -1e-9 <= t <= problem.horizon + 1e-9))
     fixed_times = fixed_times[np.append(True, np.diff(fixed_times) > 1e-6)]
     length = max(problem.segment, problem.horizon / (MOST_SEGMENTS - len(fixed_times)))
     parts = [
