@@ -152,6 +152,8 @@ class PlannedClause(TypedDict):
     text: str
     kind: str
     drones: list[str]
+    weight: float
+    priority: int
     formula: _Formula
     result: ClauseResult
 

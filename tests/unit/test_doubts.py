@@ -93,11 +93,13 @@ def test_command_answers_in_json(tmp_path: Path) -> None:
 
 
 def test_command_answers_in_words(tmp_path: Path) -> None:
-    mission(tmp_path, "@odd eventually[0,40] (d1 in tr1 and d1 in tr2)")
+    mission(tmp_path, "@odd {weight 2, priority 3} eventually[0,40] (d1 in tr1 and d1 in tr2)")
     done = spec(str(tmp_path / "mission.toml"))
     assert done.returncode == 0, done.stderr
     assert "warning: @odd is contradictory: d1 cannot be in tr1 and tr2 at once" in done.stdout
     assert "@apart  dist(d1, d2) >= 3  over [0, 60] s" in done.stdout
+    assert "@odd {weight 2, priority 3} (rest)  eventually[0, 40]" in done.stdout
+    assert "@apart (invariant)" in done.stdout
 
 
 def test_command_names_a_missing_file() -> None:

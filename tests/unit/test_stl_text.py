@@ -1,6 +1,7 @@
 """Text syntax of mission formulas: what it means, what it refuses, and that the printer undoes the parser."""
 
 import re
+from dataclasses import replace
 from itertools import permutations
 
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fleet.errors import FormulaError
-from fleet.stl import RESERVED, Vocabulary, default_formula, is_name, parse, to_text
+from fleet.stl import RESERVED, Vocabulary, clause_text, default_formula, is_name, parse, to_text
 from tests.unit.formulas import DRONES, formulas
 
 WORDS = Vocabulary(DRONES, ("tower", "cable"), ("tr1", "tr2"), T=60.0, T_s=0.05, delta_min=3.0)
@@ -165,6 +166,23 @@ def test_names_and_texts_of_clauses():
     ]
 
 
+@pytest.mark.parametrize(
+    ("attributes", "weight", "priority"),
+    [
+        ("", 1.0, 0),
+        ("{weight 2}", 2.0, 0),
+        ("{ priority 3 }", 1.0, 3),
+        ("{weight 2.5, priority 3}", 2.5, 3),
+        ("{priority 3, weight 1/4}", 0.25, 3),
+        ("{weight 1e-3,\n priority 0} # light", 0.001, 0),
+    ],
+)
+def test_weights_and_priorities(attributes, weight, priority):
+    (clause,) = parse(f"@a {attributes}\n always[0,5] d1 in tr1", WORDS)
+    assert (clause.weight, clause.priority, clause.text) == (weight, priority, "always[0,5] d1 in tr1")
+    assert parse(clause_text(clause), WORDS) == [replace(clause, text=to_text(clause.formula))]
+
+
 def test_what_is_true_in_any_case_is_left_out():
     lonely = Vocabulary(("d1",), (), ("tr1",), T=10.0, T_s=0.1, delta_min=3.0)
     text = (
@@ -217,6 +235,19 @@ def test_what_is_true_in_any_case_is_left_out():
         ("always[0,1e999] d1 in tr1", (1, 10), "too large"),
         ("@a d1 in tr1 @a d2 in tr1", (1, 14), "two clauses"),
         (f"@{'n' * 33} d1 in tr1", (1, 2), "31 letters"),
+        ("@a {wieght 2} d1 in tr1", (1, 5), "'wieght' is not an attribute of a clause; legal: weight, "),
+        ("@a {weight 0} d1 in tr1", (1, 12), "the weight 0 is not legal; need a number above 0"),
+        ("@a {weight -1} d1 in tr1", (1, 12), "the weight -1 is not legal"),
+        ("@a {weight 1e4} d1 in tr1", (1, 12), "to 1000"),
+        ("@a {weight 1e999} d1 in tr1", (1, 12), "too large"),
+        ("@a {weight d1.x} d1 in tr1", (1, 12), "a weight is a number"),
+        ("@a {priority 1.5} d1 in tr1", (1, 14), "the priority 1.5 is not legal; need a whole number"),
+        ("@a {priority -1} d1 in tr1", (1, 14), "the priority -1 is not legal"),
+        ("@a {weight 2, weight 3} d1 in tr1", (1, 15), "the weight is given twice"),
+        ("@a {weight} d1 in tr1", (1, 11), "unexpected '}'"),
+        ("@a {} d1 in tr1", (1, 5), "expected a name"),
+        ("@a {weight 2; d1 in tr1", (1, 13), "unexpected ';'"),
+        ("{weight 2} d1 in tr1", (1, 1), "unexpected '{'"),
         ("not " * 100 + "d1 in tr1", (1, 1), "nested"),
         ("(" * 3000 + "d1 in tr1" + ")" * 2999, (1, 6009), "too early"),
     ],
@@ -241,7 +272,9 @@ def test_parse_undoes_print(formula):
 @settings(max_examples=400, deadline=None, derandomize=True)
 @given(
     st.lists(
-        st.sampled_from([*sorted(RESERVED), *"[](),:;@.+-*/", "!=", ">=", "<=", "->", "d1", "tr1", "d", "2"])
+        st.sampled_from(
+            [*sorted(RESERVED), *"[](){},:;@.+-*/", "weight", "!=", ">=", "<=", "->", "d1", "tr1", "d", "2"]
+        )
     )
 )
 def test_any_text_is_read_or_refused_in_place(tokens):

@@ -230,6 +230,8 @@ fn plan() -> Plan {
             text: "always[0,T] d1 in workspace".into(),
             kind: "invariant".into(),
             drones: vec!["d1".into()],
+            weight: 1.0,
+            priority: 0,
             formula: Formula::Always { from: 0.0, to: horizon, f: Box::new(stay) },
             result: ClauseResult { rho: 5.0, rho_lower: 5.0, t_tightest: 0.0 },
         }],

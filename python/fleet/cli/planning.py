@@ -104,7 +104,7 @@ def plan_fields(result: PlanResult) -> dict[str, Any]:
 
 def planned_clause(clause: Mapping[str, Any], result: Mapping[str, float]) -> dict[str, Any]:
     """A clause of a plan as `--json` has it, with ``result`` as its robustness."""
-    head = {key: clause[key] for key in ("id", "text", "kind", "drones")}
+    head = {key: clause[key] for key in ("id", "text", "kind", "drones", "weight", "priority")}
     return head | {key: result[key] for key in ("rho", "rho_lower", "t_tightest")}
 
 

@@ -16,9 +16,12 @@ if TYPE_CHECKING:
 
 def formula(answer: Reply, clauses: Iterable[Clause]) -> None:
     """The mission formula, a clause a line."""
+    from fleet.stl import attributes_text
+
     answer.say("mission formula")
     for clause in clauses:
-        answer.say(f"  @{clause.id}  {clause.text}")
+        attributes = attributes_text(clause.weight, clause.priority)
+        answer.say("  " + "  ".join(part for part in (f"@{clause.id}", attributes, clause.text) if part))
 
 
 def plan(answer: Reply, plan: dict[str, Any], fields: dict[str, Any]) -> None:

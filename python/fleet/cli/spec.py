@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -55,6 +56,8 @@ def parsed(scenario: Scenario, form: Specification) -> list[dict[str, Any]]:
             "formula": to_text(c.formula),
             "kind": form.kinds[c.id],
             "drones": drones_of(c.formula),
+            "weight": c.weight,
+            "priority": c.priority,
         }
         for c in scenario.clauses()
     ]
@@ -101,11 +104,20 @@ def invariant(i: Invariant) -> str:
     return f"{i.drones[0]} {'in' if i.kind == 'inside' else 'outside'} {i.region}"
 
 
+def attributes(clause: Mapping[str, Any]) -> str:
+    """Weight and priority of a clause as they are written, with a blank before; empty at the defaults."""
+    from fleet.stl import attributes_text
+
+    text = attributes_text(clause["weight"], clause["priority"])
+    return f" {text}" if text else ""
+
+
 def show(answer: Reply) -> None:
     """The same for people."""
     answer.say("formula")
     for clause in answer.fields["clauses"]:
-        answer.say(f"  @{clause['id']} ({clause['kind']})  {clause['formula']}")
+        head = f"  @{clause['id']}{attributes(clause)} ({clause['kind']})"
+        answer.say(f"{head}  {clause['formula']}")
     form = answer.fields["normal_form"]
     answer.say("events")
     for event in form["events"]:

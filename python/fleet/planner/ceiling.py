@@ -1,4 +1,4 @@
-"""The upper bound of rho: the least of what each clause could reach alone."""
+"""The upper bound of rho: the least of what each clause could reach alone, weighted and not."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def ceilings(problem: Problem) -> Iterator[Ceiling]:
 
 
 def rho_bound(problem: Problem) -> float:
-    """The least ceiling [m]; infinite for a mission of `rest` alone.
+    """The least ceiling [m], whatever the weights; infinite for a mission of `rest` alone.
 
     Raises InfeasibleError when a clause cannot reach what the tube asks (design.md, Tube).
     """
@@ -66,3 +66,8 @@ def rho_bound(problem: Problem) -> float:
             text = f"{c.why}: margin {c.rho:.2f} m, and {margin} asks for {asked:.2f} m"
             raise InfeasibleError(text, clause=c.clause)
     return min((c.rho for c in found), default=np.inf)
+
+
+def slack_bound(problem: Problem) -> float:
+    """Upper bound of the common slack r: the least ceiling over its clause's weight (weights.py)."""
+    return min((c.rho / problem.weight(c.clause) for c in ceilings(problem)), default=np.inf)

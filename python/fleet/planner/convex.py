@@ -7,7 +7,7 @@ maximised, then energy is minimised at the r reached.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from .knots import Array
 from .rows import Block, Limit, energy, stack
 from .setup import SMOOTH, Setup, warm_start
 from .solver import Solution, solve
+from .weights import added, slack_of, weighed
 
 Progress = Callable[[str, float], None]
 
@@ -69,33 +70,42 @@ class Steps:
     def rows(self, x: Array, level: float, lift: Array | None = None) -> list[Block]:
         """Rows that can matter near the trajectory `x` when r may reach `level`."""
         wanted, tube = self.setup.bound, self.setup.problem.tube
-        blocks = [*(b for _, b in self.setup.visits), *self.bounds.rows(x)]
+        blocks = [*self.visits(level), *self.bounds.rows(x)]
         for w in self.within:
-            blocks += near.inside_rows(w, x, wanted)
+            blocks += self.asked(w.clause, near.inside_rows(w, x, wanted), level)
         for w in self.beyond:
-            blocks += near.outside_rows(w, x, wanted)
+            blocks += self.asked(w.clause, near.outside_rows(w, x, wanted), level)
         for w in self.apart:
-            blocks += near.apart_rows(w, x, wanted, level, tube, lift)
+            weight = self.setup.problem.weight(w.clause)
+            blocks += weighed(near.apart_rows(w, x, wanted, weight * level, tube, lift), weight)
         blocks += self.duties.rows(x, wanted, level)
         return blocks
 
+    def visits(self, level: float) -> list[Block]:
+        """Rows of the visits and of the end at home."""
+        return [b for clause, block in self.setup.visits for b in self.asked(clause, [block], level)]
+
+    def asked(self, clause: str, blocks: Iterable[Block], level: float) -> Iterator[Block]:
+        """Rows of a clause that ask for its share of r, and for the tube at least with r at `level`."""
+        weight = self.setup.problem.weight(clause)
+        return weighed(blocks, weight, float(added(weight, self.setup.problem.tube, level)))
+
     def margins(self, x: Array) -> Margins:
         """Margins of the trajectory over everything, posed or not."""
-        wanted, tube = self.setup.bound, self.setup.problem.tube
-        found: list[tuple[float, float, str]] = []
-        for w in self.within:
-            margin = float(near.inside_margin(w, x).min())
-            found.append((margin, margin - tube, w.clause))
-        for w in self.beyond:
-            margin = near.outside_least(w, x, wanted)
-            found.append((margin, margin - tube, w.clause))
-        for w in self.apart:
-            each, asked = near.apart_margin(w, x)[0], near.pair_least(w, x, tube)
-            margin = float((each - np.maximum(asked - wanted, 0.0)).min())
-            found.append((margin, float((each - asked).min()), w.clause))
+        task, wanted = self.setup.problem, self.setup.bound
+        single = [(float(near.inside_margin(w, x).min()), w.clause) for w in self.within]
+        single += [(near.outside_least(w, x, wanted), w.clause) for w in self.beyond]
         for clause, block in self.setup.visits:
-            slack = block.rhs - (block.vals * x[block.cols]).sum(axis=1)
-            found.append((float(slack.min()), float(slack.min()) - tube, clause))
+            single.append((float((block.rhs - (block.vals * x[block.cols]).sum(axis=1)).min()), clause))
+        found: list[tuple[float, float, str]] = [
+            (slack_of(margin, task.weight(clause), task.tube, wanted), margin - task.tube, clause)
+            for margin, clause in single
+        ]
+        for w in self.apart:
+            each, asked = near.apart_margin(w, x)[0], near.pair_least(w, x, task.tube)
+            weight = task.weight(w.clause)
+            least = float((each - added(weight, asked, wanted)).min()) / weight
+            found.append((least, float((each - asked).min()), w.clause))
         found += self.duties.margins(x, wanted)
         r, worst = min([(wanted, ""), *((margin, clause) for margin, _, clause in found)])
         least, short = min((spare, clause) for _, spare, clause in found)

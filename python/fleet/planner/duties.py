@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,6 +13,7 @@ from .problem import Problem
 from .rows import Block, half_spaces, joined, separation
 from .signals import Signals, positions
 from .spec import Invariant, Specification, predicate
+from .weights import added, slack_of, weighed
 from .witness import Duty, choose
 
 #: Tilts of the planes that keep a pair together, about a quarter turn's third around the line between them.
@@ -112,34 +113,35 @@ class Duties:
         """Rows that keep the duties of `x`."""
         posed, tube = self.at(x), self.problem.tube
         for w in posed.within:
-            yield from near.inside_rows(w, x, wanted)
+            yield from self.asked(w.clause, near.inside_rows(w, x, wanted), tube, level)
         for w in posed.beyond:
-            yield from near.outside_rows(w, x, wanted)
+            yield from self.asked(w.clause, near.outside_rows(w, x, wanted), tube, level)
         for w in posed.apart:
-            yield from near.apart_rows(w, x, wanted, level, tube)
+            weight = self.problem.weight(w.clause)
+            yield from weighed(near.apart_rows(w, x, wanted, weight * level, tube), weight)
         for pair in posed.together:
-            yield from pair.rows(x)
+            yield from self.asked(pair.clause, pair.rows(x), 2 * tube, level)
         for total in posed.sums:
-            yield from total.rows(x)
+            yield from self.asked(total.clause, total.rows(x), tube, level)
+
+    def asked(self, clause: str, blocks: Iterable[Block], least: float, level: float) -> Iterator[Block]:
+        """Rows of a clause that ask for its share of r, and for `least` [m] with r at `level`."""
+        weight = self.problem.weight(clause)
+        return weighed(blocks, weight, float(added(weight, least, level)))
 
     def margins(self, x: Array, wanted: float) -> Iterator[tuple[float, float, str]]:
-        """Margin, margin over what the tube asks [m], and clause of every duty of `x`."""
-        posed, tube = self.at(x), self.problem.tube
-        for w in posed.within:
-            margin = float(near.inside_margin(w, x).min())
-            yield margin, margin - tube, w.clause
-        for w in posed.beyond:
-            margin = near.outside_least(w, x, wanted)
-            yield margin, margin - tube, w.clause
+        """Slack r, margin over what the tube asks [m], and clause of every duty of `x`."""
+        posed, tube, weight = self.at(x), self.problem.tube, self.problem.weight
+        found = [(float(near.inside_margin(w, x).min()), tube, w.clause) for w in posed.within]
+        found += [(near.outside_least(w, x, wanted), tube, w.clause) for w in posed.beyond]
+        found += [(pair.margin(x), 2 * tube, pair.clause) for pair in posed.together]
+        found += [(total.margin(x), tube, total.clause) for total in posed.sums]
+        for margin, least, clause in found:
+            yield slack_of(margin, weight(clause), least, wanted), margin - least, clause
         for w in posed.apart:
             each, asked = near.apart_margin(w, x)[0], near.pair_least(w, x, tube)
-            yield float((each - np.maximum(asked - wanted, 0.0)).min()), float((each - asked).min()), w.clause
-        for pair in posed.together:
-            margin = pair.margin(x)
-            yield margin, margin - 2 * tube, pair.clause
-        for total in posed.sums:
-            margin = total.margin(x)
-            yield margin, margin - tube, total.clause
+            most = float((each - added(weight(w.clause), asked, wanted)).min())
+            yield most / weight(w.clause), float((each - asked).min()), w.clause
 
     def pose(self, posed: Posed, duty: Duty) -> None:
         """Add one duty in the form of its predicate."""

@@ -26,6 +26,7 @@ from .problem import Problem
 from .rows import Block, gram, stack
 from .setup import SMOOTH, Setup, warm_start
 from .smooth import Smooth
+from .weights import added
 
 Progress = Callable[[str, float], None]
 
@@ -129,8 +130,8 @@ def pose_limits(program: Program, task: Problem, grid: Grid, x: Any) -> Any:
     return total
 
 
-def pose_obstacles(program: Program, w: near.Watch, x: Any, r: Any, now: Array) -> None:
-    """Each posed piece beyond a convex combination of an obstacle's faces by r."""
+def pose_obstacles(program: Program, w: near.Watch, x: Any, margin: Any, now: Array) -> None:
+    """Each posed piece beyond a convex combination of an obstacle's faces by `margin`."""
     index = np.flatnonzero(w.posed)
     if len(index) == 0:
         return
@@ -144,13 +145,16 @@ def pose_obstacles(program: Program, w: near.Watch, x: Any, r: Any, now: Array) 
     offset = w.faces[:, 3:].T @ mix
     points = control_points(x, pieces)
     reach = sum(points[k] * ca.repmat(normal[k, :], 6, 1) for k in range(3))
-    program.constrain(reach - ca.repmat(offset, 6, 1) - r, 0.0, np.inf)
+    program.constrain(reach - ca.repmat(offset, 6, 1) - margin, 0.0, np.inf)
 
 
 def pose_pairs(
-    program: Program, w: near.Watch, x: Any, r: Any, now: Array, tube: float, level: float
+    program: Program, w: near.Watch, x: Any, margin: Any, now: Array, tube: float, level: float
 ) -> None:
-    """Each posed piece of a pair apart along a vector of at most unit length."""
+    """Each posed piece of a pair apart by `margin` along a vector of at most unit length.
+
+    With the margin at `level` it is what the tube asks.
+    """
     index = np.flatnonzero(w.posed)
     if len(index) == 0:
         return
@@ -161,11 +165,13 @@ def pose_pairs(
     program.constrain(ca.sum1(along**2), 0.0, 1.0)
     one, two = (control_points(x, p.take(index)) for p in w.pieces)
     gap = sum((one[k] - two[k]) * ca.repmat(along[k, :], 6, 1) for k in range(3))
-    program.constrain(gap - ca.repmat(ca.DM(w.value + extra).T, 6, 1) - r, 0.0, np.inf)
+    program.constrain(gap - ca.repmat(ca.DM(w.value + extra).T, 6, 1) - margin, 0.0, np.inf)
 
 
-def pose_rest(program: Program, task: Problem, grid: Grid, x: Any, r: Any, parameters: Any) -> None:
-    """Smooth robustness of every part without a normal form at least r, at samples `GUIDE` apart.
+def pose_rest(
+    program: Program, task: Problem, grid: Grid, x: Any, r: Any, level: float, parameters: Any
+) -> None:
+    """Smooth robustness of every part without a normal form at least its share of r, `GUIDE` apart.
 
     They guide the solver; the verdict is the exact robustness at T_s, which the result is certified on.
     """
@@ -178,7 +184,13 @@ def pose_rest(program: Program, task: Problem, grid: Grid, x: Any, r: Any, param
     for part in task.spec.rest:
         column = walk.conjuncts(part.formula)
         program.smoothed |= ca.depends_on(column, parameters)
-        program.constrain(column - r, 0.0, np.inf)
+        program.constrain(column - share(task, part.clause, r, level), 0.0, np.inf)
+
+
+def share(task: Problem, clause: str, r: Any, level: float) -> Any:
+    """The margin that the slack `r` asks of a clause: by its weight, and the tube with r at `level`."""
+    weight = task.weight(clause)
+    return weight * r + float(added(weight, task.tube, level))
 
 
 def sampled(grid: Grid, x: Any, drone: int, times: Array) -> Any:
@@ -207,18 +219,22 @@ def build(steps: Steps, now: Array, margins: Margins, level: float) -> tuple[Pro
     p = ca.MX.sym("p", 3)
     same, value = linear(x, r, steps.setup.equal, size)
     program.constrain(same - value, 0.0, 0.0)
-    visits, value = linear(x, r, [b for _, b in steps.setup.visits], size)
+    visits, value = linear(x, r, steps.visits(level), size)
     program.constrain(visits - value, -np.inf, 0.0)
-    inside = [b for w in steps.within for b in near.inside_rows(w, now, steps.setup.bound)]
+    inside = [
+        b for w in steps.within
+        for b in steps.asked(w.clause, near.inside_rows(w, now, steps.setup.bound), level)
+    ]  # fmt: skip
     if inside:
         rows, value = linear(x, r, inside, size)
         program.constrain(rows - value, -np.inf, 0.0)
     cost = pose_limits(program, task, grid, x)
     for w in steps.beyond:
-        pose_obstacles(program, w, x, r, now)
+        pose_obstacles(program, w, x, share(task, w.clause, r, level), now)
     for w in steps.apart:
-        pose_pairs(program, w, x, r, now, task.tube, level)
-    pose_rest(program, task, grid, x, r, p)
+        weight = task.weight(w.clause)
+        pose_pairs(program, w, x, weight * r, now, task.tube, weight * level)
+    pose_rest(program, task, grid, x, r, level, p)
     program.constrain(r - p[1], 0.0, np.inf)
     return program, -r + p[0] * cost, p
 

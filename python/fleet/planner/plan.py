@@ -12,7 +12,7 @@ from fleet.errors import InfeasibleError, InputError
 
 from . import convex, groups
 from .baseline import BASELINES
-from .ceiling import rho_bound
+from .ceiling import rho_bound, slack_bound
 from .problem import Problem, problem
 from .result import PlanResult, result
 from .schedule import Itinerary, schedules
@@ -101,7 +101,7 @@ def improving(
     task = problem(scenario)
     bound = rho_bound(task)
     tell("route", bound)
-    ways, refusal = itineraries(task, min(bound, WIDEST))
+    ways, refusal = itineraries(task, wanted(task))
     watch.lap("route")
     if method in BASELINES:
         yield baseline(scenario, task, ways[0], method, bound, watch, tell)
@@ -146,10 +146,22 @@ def baseline(
 
 
 def better(a: PlanResult, b: PlanResult) -> bool:
-    """Whether plan a is better than plan b: by status, then rho to 1 mm, then the integral of |a|^2."""
+    """Whether plan a is better than plan b: by status, weighted rho to 1 mm, then the integral of |a|^2."""
     ranks = ("violated", "certified", "optimal")
-    one, other = ((ranks.index(p.status), round(p.rho, 3), -p.int_a2) for p in (a, b))
+    one, other = ((ranks.index(p.status), round(weighted_rho(p), 3), -p.int_a2) for p in (a, b))
     return one > other
+
+
+def weighted_rho(found: PlanResult) -> float:
+    """Least robustness [m] of a clause of a plan over its weight, the heaviest counted as 1."""
+    clauses = found.plan["clauses"]
+    heaviest = max(c["weight"] for c in clauses)
+    return float(min(c["result"]["rho"] * heaviest / c["weight"] for c in clauses))
+
+
+def wanted(task: Problem) -> float:
+    """The largest common slack r that is worth while [m]."""
+    return min(slack_bound(task), WIDEST)
 
 
 def itineraries(task: Problem, bound: float) -> tuple[list[Itinerary], InfeasibleError | None]:
@@ -178,7 +190,7 @@ def attempt(scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: 
     the plan is too large for the wire.
     """
     tell("build", bound)
-    flight = groups.fly(one.task, one.way, min(bound, WIDEST), one.run, tell)
+    flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell)
     watch.lap("solve")
     watch.move(flight.build_s, "solve", "build")
     refuse(one.task, flight.margins)

@@ -10,6 +10,7 @@ import numpy as np
 
 from .knots import Array
 from .spec import Invariant, Specification, specification
+from .weights import shares
 
 if TYPE_CHECKING:
     from fleet.scenario import Region, Scenario
@@ -25,7 +26,8 @@ class Problem:
     `starts` (d, 3) [m], `psi` (d,) heading at the start [rad], `homes` region name per drone,
     `headings` required heading per target [rad],
     `segment` longest segment [s], `c` sharpness of smooth robustness [1/m], `max_iterations` and
-    `tolerance` those of the nonlinear program, `given` hand-made orders of targets, or None.
+    `tolerance` those of the nonlinear program, `given` hand-made orders of targets, or None, `weights` of
+    clauses by id, the heaviest 1 (weights.py).
     """
 
     ids: tuple[str, ...]
@@ -50,18 +52,25 @@ class Problem:
     max_iterations: int
     tolerance: float
     given: Mapping[str, tuple[str, ...]] | None
+    weights: Mapping[str, float]
 
     def number(self, drone: str) -> int:
         """Index of a drone."""
         return self.ids.index(drone)
 
+    def weight(self, clause: str) -> float:
+        """Weight of a clause; 1 for what the mission does not name, such as coming home at T."""
+        return self.weights.get(clause, 1.0)
+
     def pairs(self) -> list[tuple[int, int, Invariant]]:
-        """Pairs of drones (a < b) that must keep apart, each once, with the invariant that says so."""
+        """Pairs of drones (a < b) that must keep apart, each once, by the heaviest invariant that says so."""
         found: dict[tuple[int, int, float, tuple[float, float]], Invariant] = {}
         for inv in self.spec.invariants:
             if inv.kind == "apart":
                 a, b = sorted(self.number(d) for d in inv.drones)
-                found.setdefault((a, b, inv.value, inv.window), inv)
+                key = (a, b, inv.value, inv.window)
+                if key not in found or self.weight(inv.clause) > self.weight(found[key].clause):
+                    found[key] = inv
         return [(a, b, inv) for (a, b, _, _), inv in found.items()]
 
 
@@ -101,4 +110,5 @@ def problem(scenario: Scenario) -> Problem:
         max_iterations=int(scenario.planner.max_iterations),
         tolerance=float(scenario.planner.tolerance),
         given=None if given is None else {d: tuple(order) for d, order in given.items()},
+        weights=shares(scenario.clauses()),
     )

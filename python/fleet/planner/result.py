@@ -132,6 +132,8 @@ def assemble(
             "text": c.text,
             "kind": problem.spec.kinds[c.id],
             "drones": list(dict.fromkeys(drones_of(c.formula))),
+            "weight": float(c.weight),
+            "priority": c.priority,
             "formula": c.formula,
             "result": proof.clauses[c.id],
         }

@@ -7,7 +7,7 @@ on until nothing changes. What comes out is a warm start, never a proof.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -80,7 +80,8 @@ class Sketch:
                     (high + duty.first - duty.anchor.at) * T_s,
                 )
             option = (f["drone"], f["region"])
-            put_in(visits, Visit(duty.clause, (option,), (round(window[0], 9), round(window[1], 9)), dwell))
+            wish = Visit(duty.clause, (option,), (round(window[0], 9), round(window[1], 9)), dwell)
+            put_in(visits, wish, self.problem.weight)
         return visits
 
     def room(self, anchor: Anchor) -> tuple[float, float]:
@@ -159,12 +160,13 @@ def given(problem: Problem, way: Itinerary, signals: Signals, bound: float) -> S
     return signals
 
 
-def put_in(visits: list[Visit], wish: Visit) -> None:
-    """Narrow a visit that can serve the wish as well, or add the wish."""
+def put_in(visits: list[Visit], wish: Visit, weight: Callable[[str], float]) -> None:
+    """Narrow a visit that can serve the wish as well (for the heavier clause of the two), or add the wish."""
     for k, v in enumerate(visits):
         low, high = max(v.window[0], wish.window[0]), min(v.window[1], wish.window[1])
         if wish.options[0] in v.options and low <= high + 1e-9:
-            visits[k] = Visit(wish.clause, wish.options, (low, max(low, high)), max(v.dwell, wish.dwell))
+            clause = v.clause if weight(v.clause) > weight(wish.clause) else wish.clause
+            visits[k] = Visit(clause, wish.options, (low, max(low, high)), max(v.dwell, wish.dwell))
             return
     visits.append(wish)
 

@@ -2,7 +2,7 @@
 
 from fleet.stl.default import default_formula
 from fleet.stl.normal import Event, Gather, Invariant, NormalForm, Rest, Visit, drones_of, normal_form
-from fleet.stl.printer import to_text
+from fleet.stl.printer import attributes_text, clause_text, to_text
 from fleet.stl.text import parse
 from fleet.stl.vocabulary import RESERVED, Clause, Formula, Vocabulary, is_name
 
@@ -17,6 +17,8 @@ __all__ = [
     "Rest",
     "Visit",
     "Vocabulary",
+    "attributes_text",
+    "clause_text",
     "default_formula",
     "drones_of",
     "is_name",

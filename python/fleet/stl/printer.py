@@ -4,11 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-from fleet.stl.vocabulary import Formula
+from fleet.stl.vocabulary import Clause, Formula
 
 # How tightly each operator binds; an operand that binds less tightly gets parentheses.
 _BINDING = {"implies": 1, "or": 2, "and": 3, "until": 4, "not": 5, "always": 5, "eventually": 5}
 _PREDICATE = 6
+
+
+def clause_text(clause: Clause) -> str:
+    """The clause in the text syntax: name, weight and priority where they say something, formula."""
+    parts = (f"@{clause.id}", attributes_text(clause.weight, clause.priority), to_text(clause.formula))
+    return " ".join(part for part in parts if part)
+
+
+def attributes_text(weight: float, priority: int) -> str:
+    """`{weight 2, priority 3}`, without what is at its default; empty when both are."""
+    shown = [f"weight {_number(weight)}"] if weight != 1 else []
+    shown += [f"priority {priority}"] if priority != 0 else []
+    return f"{{{', '.join(shown)}}}" if shown else ""
 
 
 def to_text(formula: Formula) -> str:

@@ -114,6 +114,8 @@ fn certify(plan: &mut Plan) {
             text: "by hand".into(),
             kind: "invariant".into(),
             drones: PADS.map(|(id, _)| id.to_owned()).to_vec(),
+            weight: 1.0,
+            priority: 0,
             formula,
             result: ClauseResult {
                 rho: exact.rho,

@@ -82,6 +82,10 @@ pub struct PlannedClause {
     pub kind: String,
     /// Drones that it speaks of.
     pub drones: Vec<String>,
+    /// How much of the fleet's common margin it was planned with, above 0; 1 unless the text says other.
+    pub weight: f64,
+    /// Clauses of smaller priority give way first when a mission cannot hold.
+    pub priority: u32,
     /// Parsed tree.
     pub formula: Formula,
     /// Its robustness in this plan.

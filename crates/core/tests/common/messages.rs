@@ -177,6 +177,8 @@ fn plan(status: PlanStatus) -> Plan {
         text: "d1 in box".to_owned(),
         kind: ["invariant", "event", "rest"][i % 3].to_owned(),
         drones: vec!["d1".to_owned()],
+        weight: 1.0 + i as f64 / 2.0,
+        priority: i as u32,
         formula,
         result: ClauseResult { rho: 1.0, rho_lower: 0.875, t_tightest: 2.5 },
     });

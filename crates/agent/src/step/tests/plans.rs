@@ -49,6 +49,8 @@ fn visit_clause() -> PlannedClause {
         text: "eventually[0,15] d1 in tr1".into(),
         kind: "event".into(),
         drones: vec!["d1".into()],
+        weight: 1.0,
+        priority: 0,
         formula: Formula::Eventually { from: 0.0, to: 15.0, f: Box::new(visit) },
         result: ClauseResult { rho: 0.5, rho_lower: 0.5, t_tightest: 10.0 },
     }
