@@ -40,12 +40,15 @@ class Sure:
 class Judge:
     """Decides formulas in negation normal form where regions, reach and invariants are enough to."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, invariants: list[Invariant] | None = None) -> None:
+        """Takes the invariants that hold in any case; those of the whole mission if not given."""
         self._scenario = scenario
         spaces = [scenario.workspace, *scenario.obstacles, *scenario.targets]
         self._regions: dict[str, Region] = {r.name: r for r in (*spaces, *(d.home for d in scenario.drones))}
         self._starts = {d.id: np.asarray(d.start, dtype=float) for d in scenario.drones}
-        self._invariants = specification(scenario.clauses(), float(scenario.mission.T)).invariants
+        if invariants is None:
+            invariants = specification(scenario.clauses(), float(scenario.mission.T)).invariants
+        self._invariants = invariants
 
     def over(self, f: Formula, first: float, last: float) -> Sure | None:
         """Whether `f` holds at every time from `first` to `last` [s], or at none of them; None if unsure."""

@@ -117,19 +117,67 @@ class LogError(InputError):
         self.path = path
 
 
+@dataclass(frozen=True)
+class Need:
+    """When `drone` can be in `region` at the earliest, and by when it must be there [s, mission time]."""
+
+    drone: str
+    region: str
+    needs_s: float
+    by_s: float
+
+    def __str__(self) -> str:
+        if self.needs_s > self.by_s + 1e-9:
+            where = f"{self.drone} cannot reach {self.region} before {self.by_s:.1f} s"
+            return f"{where}: needs {self.needs_s:.1f} s, {self.needs_s - self.by_s:.1f} s too many"
+        return f"{self.drone} reaches {self.region} at {self.needs_s:.1f} s, due by {self.by_s:.1f} s"
+
+    def as_dict(self) -> dict[str, str | float]:
+        """One of `times` of `conflict`."""
+        return {"drone": self.drone, "region": self.region, "needs_s": self.needs_s, "by_s": self.by_s}
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Clauses that cannot hold together (none: the limits of flight alone forbid the mission).
+
+    `proved` tells an impossibility from a search without result; with `minimal`, a plan was found for
+    the clauses without any one of them. `text` is for people; `times` has the visits concerned.
+    """
+
+    clauses: tuple[str, ...]
+    proved: bool
+    minimal: bool
+    text: str
+    times: tuple[Need, ...] = ()
+
+    def as_dict(self) -> dict[str, object]:
+        """`conflict` of `plan --json`."""
+        head = {"clauses": list(self.clauses), "proved": self.proved, "minimal": self.minimal}
+        return {**head, "text": self.text, "times": [need.as_dict() for need in self.times]}
+
+
 class InfeasibleError(FleetError):
-    """No plan satisfies the mission; `clause` is the id of a clause that cannot hold, if known."""
+    """No plan satisfies the mission, or none was found.
+
+    `clause` is the id of a clause that cannot hold, if known; `conflict` the set of clauses that cannot
+    hold together, once it was searched for.
+    """
 
     exit_code = Exit.INFEASIBLE
     code = "infeasible"
 
-    def __init__(self, message: str, *, clause: str | None = None) -> None:
-        field = f"clause {clause}" if clause else ""
+    def __init__(
+        self, message: str, *, clause: str | None = None, conflict: Conflict | None = None
+    ) -> None:
+        named = conflict.clauses if conflict else (clause,) if clause else ()
+        field = f"clause{'s' if len(named) > 1 else ''} {', '.join(named)}" if named else ""
         super().__init__(
             f"{field}: {message}" if field else message,
             problems=[Problem(self.code, "", field, message)],
         )
-        self.clause = clause
+        self.clause = named[0] if named else None
+        self.conflict = conflict
 
 
 class EnvironmentError_(FleetError):  # noqa: N801  (the plain name is a built-in)
