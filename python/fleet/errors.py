@@ -167,9 +167,7 @@ class InfeasibleError(FleetError):
     exit_code = Exit.INFEASIBLE
     code = "infeasible"
 
-    def __init__(
-        self, message: str, *, clause: str | None = None, conflict: Conflict | None = None
-    ) -> None:
+    def __init__(self, message: str, *, clause: str | None = None, conflict: Conflict | None = None) -> None:
         named = conflict.clauses if conflict else (clause,) if clause else ()
         field = f"clause{'s' if len(named) > 1 else ''} {', '.join(named)}" if named else ""
         super().__init__(

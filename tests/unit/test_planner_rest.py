@@ -146,9 +146,9 @@ def test_sum_over_two_drones(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("clause", "word"),
     [
-        ("@wrong eventually[0,5] (d1 in tr1 and d2 in tr2)", "tr1 cannot be reached by 5.00 s"),
+        ("@wrong eventually[0,5] (d1 in tr1 and d2 in tr2)", "d1 cannot reach tr1 before 5.0 s"),
         ("@wrong always[0,5] dist(d1,d2) <= 10", "tube"),
-        ("@wrong eventually[0,40] (d1 in tr1 and d1 in tr2)", "margin"),
+        ("@wrong eventually[0,40] (d1 in tr1 and d1 in tr2)", "disjoint"),
     ],
 )
 def test_refused_by_name(tmp_path: Path, clause: str, word: str) -> None:

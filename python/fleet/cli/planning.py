@@ -67,7 +67,7 @@ def plan(
 
 
 def make_plan(answer: Reply, scenario: Scenario, method: str = "auto") -> PlanResult:
-    """Plan with progress on stderr; an infeasible mission leaves its clause in `conflict`."""
+    """Plan with progress on stderr; an infeasible mission leaves why in `conflict`."""
     from fleet import planner
 
     if method not in METHODS:
@@ -83,7 +83,7 @@ def make_plan(answer: Reply, scenario: Scenario, method: str = "auto") -> PlanRe
             )
     except InfeasibleError as error:
         if "conflict" in answer.fields:
-            answer.fields["conflict"] = error.clause
+            answer.fields["conflict"] = error.conflict.as_dict() if error.conflict else None
         raise
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from fleet.doubts import Judge
@@ -26,13 +27,25 @@ if TYPE_CHECKING:
     from fleet.scenario import Scenario
 
 
-@dataclass(frozen=True)
+@dataclass
 class Court:
     """A mission that has no plan, and what it takes to find out why."""
 
     scenario: Scenario
     task: Problem
 
+    def verdict(self, error: InfeasibleError) -> InfeasibleError:
+        """The error with a conflict: as it is if it has one, else proved, else searched for."""
+        if error.conflict is not None:
+            return error
+        return self.proof or self.search(error)
+
+    def refuse_proved(self) -> None:
+        """Raises InfeasibleError if a conflict is proved; asked again, it costs nothing."""
+        if self.proof is not None:
+            raise self.proof
+
+    @cached_property
     def proof(self) -> InfeasibleError | None:
         """The error that says which clauses cannot hold, with a proof; None when nothing is proved."""
         found = next(self.impossible(self.task), None)
@@ -53,8 +66,8 @@ class Court:
     def impossible(self, task: Problem) -> Iterator[Impossible]:
         """Proofs that a mission cannot hold."""
         yield from impossible_margins(task)
-        yield from self.impossible_formulas(task)
         yield from impossible_times(task)
+        yield from self.impossible_formulas(task)
 
     def impossible_formulas(self, task: Problem) -> Iterator[Impossible]:
         """Clauses that are false by regions, reach and the mission's own invariants alone."""
@@ -76,8 +89,9 @@ class Court:
         trials = Trials(self.task)
         clauses = tuple(self.task.spec.kinds)
         if trials.plans(clauses):
-            # The bounded trial found what the planner then could not certify: its own words are best.
-            return error
+            # The bounded trial kept all margins, and yet no plan was certified: those words are best.
+            text = error.problems[0].message
+            return refusal(self.task, Conflict((error.clause,) if error.clause else (), False, False, text))
         least = irreducible(clauses, lambda kept: not trials.plans(kept))
         why = trials.why(least) or str(error)
         part = subset(self.task, least)
@@ -91,7 +105,7 @@ def impossible_times(task: Problem) -> Iterator[Impossible]:
     reach = least_times(task, geometry)
     for index in misfits(reach):
         late = [need for need in needs(reach.part(index)) if need.needs_s > need.by_s + 1e-9]
-        visits = [task.spec.visits[e] for e in index]
+        visits = [reach.visits[e] for e in index]
         names = " and ".join(dict.fromkeys(v.options[0][1] for v in visits))
         why = "; ".join(map(str, late)) or f"no drone can make the visit of {names}"
         barring = [
@@ -105,9 +119,9 @@ def impossible_times(task: Problem) -> Iterator[Impossible]:
 
 def reached(task: Problem, clauses: tuple[str, ...]) -> list[Need]:
     """Earliest times of the visits of a mission, and of coming home where that is what comes too late."""
-    visits = [e for e, v in enumerate(task.spec.visits) if v.clause in clauses]
-    reach = least_times(task, Geometry(task)).part(visits)
-    return told(task, needs(reach)) if visits else []
+    reach = least_times(task, Geometry(task))
+    visits = [e for e, v in enumerate(reach.visits) if v.clause in clauses]
+    return told(task, needs(reach.part(visits))) if visits else []
 
 
 def told(task: Problem, times: list[Need]) -> list[Need]:
@@ -116,12 +130,17 @@ def told(task: Problem, times: list[Need]) -> list[Need]:
 
 
 def refusal(task: Problem, conflict: Conflict, exhausted: bool = False) -> InfeasibleError:
-    """The error of a conflict: verdict, reason, and the conditions of flight that hold whatever the clauses."""
+    """The error of a conflict: verdict, reason, and the conditions of flight, which hold in any case."""
     verdict = "cannot hold (proved)" if conflict.proved else "no plan was found"
     if len(conflict.clauses) > 1:
-        verdict = f"cannot hold together (proved)" if conflict.proved else "no plan was found for all of them"
+        verdict = "cannot hold together (proved)" if conflict.proved else "no plan was found for all of them"
     limits = f"v_max = {task.v_max:g} m/s, a_max = {task.a_max:g} m/s^2"
     flight = f"from rest at the start to rest at home at T = {task.horizon:g} s"
-    given = f"given {limits}, a tube of {task.tube:g} m, flight {flight}"
+    orders = ", the assignment made by hand" if task.given else ""
+    given = f"given {limits}, a tube of {task.tube:g} m, flight {flight}{orders}"
     rest = "; whether fewer clauses conflict was not examined to the end" if exhausted else ""
-    return InfeasibleError(f"{verdict}: {conflict.text} ({given}{rest})", conflict=conflict)
+    error = InfeasibleError(f"{verdict}: {conflict.text} ({given}{rest})", conflict=conflict)
+    for need in conflict.times:
+        if str(need) not in conflict.text:
+            error.add_note(f"  {need}")
+    return error

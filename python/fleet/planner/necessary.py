@@ -45,7 +45,9 @@ class Geometry:
         """Corners (k, 3) [m] of the part of each visited region that is deeper inside than the tube."""
         spec, homes = self.problem.spec, self.problem.homes
         names = {r for v in spec.visits for _, r in v.options} | set(homes)
-        names |= {place["region"] for r in spec.rest for g in gatherings(r.formula, 0.0, 0.0) for place in g[0]}
+        names |= {
+            place["region"] for r in spec.rest for g in gatherings(r.formula, 0.0, 0.0) for place in g[0]
+        }
         return {n: self.core((self.problem.regions[n],)) for n in sorted(names)}
 
     def core(self, shapes: Sequence[Array]) -> Array:
@@ -62,7 +64,7 @@ class Geometry:
         return found
 
     def barred(self, drone: str, region: str, window: tuple[float, float]) -> Invariant | None:
-        """An invariant that keeps the drone out of the region, by the tube, at all times of the window [s]."""
+        """An invariant that keeps the drone out of the region, by the tube, all through the window [s]."""
         for inv in self.invariants[drone]:
             if inv.window[0] > window[0] + 1e-9 or inv.window[1] < window[1] - 1e-9:
                 continue
@@ -101,7 +103,7 @@ class Geometry:
 
 
 def gatherings(f: Formula, first: float, last: float) -> Iterator[tuple[list[Formula], float, float]]:
-    """Regions that drones must be in at once, at some time from `first` to `last` [s]: `in` joined by `and`."""
+    """The `in` that must hold at once, at some time from `first` to `last` [s], and from when to when."""
     op = f["op"]
     if op in ("in", "and"):
         fs = f["fs"] if op == "and" else [f]
@@ -155,11 +157,13 @@ def forbids(problem: Problem, inv: Invariant, region: str) -> str:
 
 
 def common_margin(problem: Problem, inv: Invariant, region: str) -> float:
-    """Largest margin [m] of being in the region and keeping the invariant at once: a linear program a face."""
+    """Largest margin [m] of being in the region and keeping the invariant: a linear program a face."""
     from scipy.optimize import linprog
 
     inside = problem.regions[region]
-    faces = problem.regions[inv.region] if inv.region else np.array([[-r for r in inv.row[:3]] + [inv.row[3]]])
+    faces = (
+        problem.regions[inv.region] if inv.region else np.array([[-r for r in inv.row[:3]] + [inv.row[3]]])
+    )
     choices = [np.array([[*-f[:3], -f[3]]]) for f in faces] if inv.kind == "outside" else [faces]
     best = -np.inf
     for further in choices:
@@ -175,10 +179,10 @@ def impossible_meetings(problem: Problem, geometry: Geometry) -> Iterator[Imposs
     """Drones that must be in regions at once that are nearer to each other than they may be."""
     T = problem.horizon
     homes = [(d, r, "") for d, r in zip(problem.ids, problem.homes, strict=True)]
-    meetings = [(homes, T, T)]
+    meetings: list[tuple[list[tuple[str, str, str]], float, float]] = [(homes, T, T)]
     for part in problem.spec.rest:
-        for places, first, last in gatherings(part.formula, 0.0, 0.0):
-            meetings.append(([(p["drone"], p["region"], part.clause) for p in places], first, last))
+        for fs, first, last in gatherings(part.formula, 0.0, 0.0):
+            meetings.append(([(str(f["drone"]), str(f["region"]), part.clause) for f in fs], first, last))
     apart = {(a, b): inv for a, b, inv in problem.pairs()}
     for places, first, last in meetings:
         for (one, at, clause), (other, there, _) in combinations(places, 2):

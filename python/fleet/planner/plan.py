@@ -8,11 +8,13 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from fleet import _core
+from fleet.assign import EXACT
 from fleet.errors import InfeasibleError, InputError
 
 from . import convex, groups
 from .baseline import BASELINES
 from .ceiling import rho_bound, slack_bound
+from .conflict import Court
 from .problem import Problem, problem
 from .result import PlanResult, result
 from .schedule import Itinerary, schedules
@@ -96,9 +98,22 @@ def improving(
     """
     if method not in ("auto", *METHODS, *BASELINES):
         raise ValueError(f"method is {method!r}; legal are {', '.join(('auto', *METHODS, *BASELINES))}")
-    tell = progress or (lambda stage, rho: None)
     watch = Watch()
-    task = problem(scenario)
+    court = Court(scenario, problem(scenario))
+    try:
+        yield from search(court, progress or (lambda stage, rho: None), method, watch)
+    except InfeasibleError as error:
+        raise court.verdict(error) from None
+
+
+def search(court: Court, tell: Progress, method: str, watch: Watch) -> Iterator[PlanResult]:
+    """The plans of `improving`.
+
+    Raises InfeasibleError at the first sign of trouble if a conflict is proved, and when nothing was found.
+    """
+    scenario, task = court.scenario, court.task
+    if len(task.spec.visits) > EXACT:
+        court.refuse_proved()  # before the whole map is surveyed in vain
     bound = rho_bound(task)
     tell("route", bound)
     ways, refusal = itineraries(task, wanted(task))
@@ -112,6 +127,8 @@ def improving(
             found = attempt(scenario, one, bound, watch, tell)
         except InfeasibleError as error:
             refusal = refusal or error
+            if best is None:
+                court.refuse_proved()
             continue
         except InputError:
             if best is None:

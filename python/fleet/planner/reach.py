@@ -18,7 +18,7 @@ from fleet.errors import Need
 from fleet.route import leg_time, turn_time
 
 from .knots import Array
-from .necessary import Geometry
+from .necessary import Geometry, gatherings
 from .problem import Problem
 from .schedule import permitted, shortest_turn
 from .spec import Visit
@@ -62,37 +62,58 @@ def ramp(length: Array, v_max: float, a_max: float) -> Array:
 
 
 def least_times(problem: Problem, geometry: Geometry) -> Reach:
-    """Lower bounds of all legs of the visits; infinite where a drone may not go."""
-    visits, drones, n = problem.spec.visits, len(problem.ids), len(problem.spec.visits)
+    """Lower bounds of all legs of the visits, those that `rest` needs included; infinite where barred."""
+    extra = needed_by_rest(problem)
+    visits = (*problem.spec.visits, *extra)
+    drones, n = len(problem.ids), len(visits)
     first, last = np.full((drones, n), np.inf), np.full((drones, n), np.inf)
     between = np.full((drones, n, n), np.inf)
     v, a = problem.v_max, problem.a_max
-    idle = np.zeros(drones)
+    # Only visits that are stops of the plan have a heading to be reached.
+    names = [*((r, True) for r in sorted(geometry.corners)), *((r, False) for r in sorted(geometry.corners))]
+    number = {name: k for k, name in enumerate(names)}
+    boxes = np.concatenate([box(geometry.corners[name]) for name, _ in names], axis=1)
+    psi = [problem.headings.get(name) if stop else None for name, stop in names]
+    starts = np.stack([problem.starts, problem.starts])
+    away = np.array([[turn(problem, float(p), q) for q in psi] for p in problem.psi])
+    turns = np.array([[turn(problem, p, q) for q in psi] for p in psi])
+    out, ways = np.maximum(ramp(gap(starts, boxes), v, a), away), gap(boxes, boxes)
+    back, legs = ramp(ways, v, a), np.maximum(ways / v, turns)
+    homes = [number[h, False] for h in problem.homes]
+    idle = np.array([leg_time(float(x), v, a) for x in gap(starts, boxes)[range(drones), homes]])
+    dwell = np.array([visit.dwell for visit in visits])
     for d, name in enumerate(problem.ids):
-        start = np.stack([problem.starts[d]] * 2)[:, None]
-        home = box(geometry.corners[problem.homes[d]])
-        idle[d] = leg_time(float(gap(start, home)[0, 0]), v, a)
         may = [e for e in range(n) if goes(problem, geometry, name, visits[e])]
-        if not may:
-            continue
         regions = [dict(visits[e].options)[name] for e in may]
-        boxes = np.concatenate([box(geometry.corners[r]) for r in regions], axis=1)
-        psi = [problem.headings.get(r) for r in regions]
-        away = np.array([turn(problem, float(problem.psi[d]), p) for p in psi])
-        first[d, may] = np.maximum(ramp(gap(start, boxes)[0], v, a), away)
-        last[d, may] = ramp(gap(boxes, home)[:, 0], v, a)
-        turns = np.array([[turn(problem, p, q) for q in psi] for p in psi])
-        between[d][np.ix_(may, may)] = np.maximum(gap(boxes, boxes) / v, turns)
+        at = [number[r, e < n - len(extra)] for e, r in zip(may, regions, strict=True)]
+        first[d, may], last[d, may] = out[d, at], back[at, homes[d]]
+        between[d][np.ix_(may, may)] = legs[np.ix_(at, at)]
         between[d, may, may] = np.inf
+        # Where regions overlap, one stay can be part of another.
+        shared = (ways[np.ix_(at, at)] <= 0).sum(axis=1) > 1
+        dwell[np.array(may, dtype=int)[shared]] = 0.0
         ordered(problem, name, may, regions, between[d])
-    windows = np.array([v.window for v in visits], dtype=float).reshape(n, 2)
-    dwell = np.array([v.dwell for v in visits])
-    return Reach(problem, tuple(visits), Legs(first, between, last, idle, windows, dwell, problem.horizon))
+    windows = np.array([visit.window for visit in visits], dtype=float).reshape(n, 2)
+    return Reach(problem, visits, Legs(first, between, last, idle, windows, dwell, problem.horizon))
+
+
+def needed_by_rest(problem: Problem) -> tuple[Visit, ...]:
+    """Visits without which a clause that has no normal form is false whatever its witnesses and branches."""
+    found = [
+        Visit(part.clause, ((place["drone"], place["region"]),), (first, last))
+        for part in problem.spec.rest
+        for places, first, last in gatherings(part.formula, 0.0, 0.0)
+        for place in places
+        if place["region"] not in (problem.workspace, *problem.obstacles)
+    ]
+    return tuple(dict.fromkeys(found))
 
 
 def ordered(problem: Problem, name: str, may: list[int], regions: list[str], between: Array) -> None:
     """Forbid legs against the order of targets that is given by hand."""
     order = (problem.given or {}).get(name, ())
+    if not order:
+        return
     for (e, one), (f, other) in combinations(zip(may, regions, strict=True), 2):
         if one in order and other in order and one != other:
             before, after = (e, f) if order.index(one) < order.index(other) else (f, e)
@@ -102,7 +123,11 @@ def ordered(problem: Problem, name: str, may: list[int], regions: list[str], bet
 def goes(problem: Problem, geometry: Geometry, drone: str, visit: Visit) -> bool:
     """Whether a drone may make a visit: named by it, not forbidden by hand, not barred by an invariant."""
     region = dict(visit.options).get(drone)
-    if region is None or not permitted(problem, problem.number(drone), visit):
+    if (
+        region is None
+        or region not in geometry.corners
+        or not permitted(problem, problem.number(drone), visit)
+    ):
         return False
     return len(geometry.corners[region]) > 0 and geometry.barred(drone, region, visit.window) is None
 
@@ -115,7 +140,7 @@ def box(corners: Array) -> Array:
 
 
 def gap(one: Array, other: Array) -> Array:
-    """Longest axis (m, n) [m] of the way between boxes (2, m, 3) and (2, n, 3): a bound for what is inside."""
+    """Longest axis (m, n) [m] between boxes (2, m, 3) and (2, n, 3): a bound for what is inside."""
     over = np.maximum(one[0][:, None] - other[1][None], other[0][None] - one[1][:, None])
     return np.asarray(np.maximum(over, 0.0).max(axis=2))
 

@@ -220,9 +220,22 @@ def schedules(problem: Problem, bound: float) -> Iterator[Itinerary]:
             return
     world = survey(problem, bound)
     found = list(timed_itineraries(problem, world))
+    asked = asked_for(problem)
+    if not found and asked != problem.obstacles:
+        # Ways keep off every obstacle where they can, and off those of the mission in any case.
+        world = survey(replace(problem, obstacles=asked), bound)
+        found = list(timed_itineraries(problem, world))
     if not found:
         raise unreachable(problem, world)
     yield from found
+
+
+def asked_for(problem: Problem) -> tuple[str, ...]:
+    """The obstacles that the mission speaks of; all of them where it has clauses without a normal form."""
+    if problem.spec.rest:
+        return problem.obstacles
+    named = {inv.region for inv in problem.spec.invariants if inv.kind == "outside"}
+    return tuple(o for o in problem.obstacles if o in named)
 
 
 def timed_itineraries(problem: Problem, world: Map) -> Iterator[Itinerary]:

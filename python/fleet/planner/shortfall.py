@@ -10,6 +10,7 @@ from .groups import Flight
 from .knots import Array
 from .problem import Problem
 from .schedule import Itinerary
+from .signals import Signals
 from .spec import Invariant
 
 #: Shortfalls that are told at most.
@@ -20,10 +21,16 @@ def shortfalls(task: Problem, way: Itinerary, flight: Flight) -> str:
     """The largest shortfalls of trajectories against limits and the tube, in words."""
     if flight.margins.share > 1:
         limits = f"v_max = {task.v_max:g} m/s and a_max = {task.a_max:g} m/s^2"
-        return f"{limits} cannot be kept: the best found passes one by {100 * (flight.margins.share - 1):.1f} %"
+        return (
+            f"{limits} cannot be kept: the best found passes one by {100 * (flight.margins.share - 1):.1f} %"
+        )
     times = np.arange(round(task.horizon / task.sample) + 1).astype(np.float64) * task.sample
     positions = np.stack([np.asarray(t.sample(times))[:, :3] for t in flight.tracks])
-    found = [*invariant_margins(task, times, positions), *visit_margins(task, way, times, positions)]
+    found = [
+        *invariant_margins(task, times, positions),
+        *visit_margins(task, way, times, positions),
+        *rest_margins(task, positions),
+    ]
     short = sorted((margin - asked, k, text) for k, (margin, asked, text) in enumerate(found))
     words = [text for spare, _, text in short[:TOLD] if spare < 0]
     if words:
@@ -47,6 +54,14 @@ def invariant_margins(task: Problem, times: Array, positions: Array) -> Iterator
         k = int(value.argmin())
         asked = 2 * task.tube if inv.kind == "apart" else task.tube
         yield float(value[k]), asked, words(inv, float(value[k]), asked, float(times[inside][k]))
+
+
+def rest_margins(task: Problem, positions: Array) -> Iterator[tuple[float, float, str]]:
+    """Robustness of the parts without a normal form, as `invariant_margins`; at most the tube is asked."""
+    signals = Signals.of(task, np.ascontiguousarray(positions))
+    for part in task.spec.rest:
+        rho = float(signals.of_part(part.formula)[0])
+        yield rho, task.tube, f"@{part.clause} holds with a margin of {rho:.2f} m only"
 
 
 def margins(task: Problem, inv: Invariant, positions: Array) -> Array:
@@ -73,12 +88,18 @@ def words(inv: Invariant, margin: float, asked: float, t: float) -> str:
 def visit_margins(
     task: Problem, way: Itinerary, times: Array, positions: Array
 ) -> Iterator[tuple[float, float, str]]:
-    """Margin of every visit at its time, and of every drone at home, as `invariant_margins`."""
+    """Least margin of each drone over its visits and home, as `invariant_margins`.
+
+    They are told together: where limits are too tight, the optimiser shares what is missing among them.
+    """
     for d, name in enumerate(task.ids):
-        stops = [(s.region, s.t) for s in way.stops[d]]
-        for region, t in (*stops, (task.homes[d], task.horizon)):
-            k = int(np.abs(times - t).argmin())
-            faces = task.regions[region]
-            margin = float((faces[:, 3] - positions[d, k] @ faces[:, :3].T).min())
-            short = f"{margin:.2f} m, {task.tube - margin:.2f} m less than the tube asks"
-            yield margin, task.tube, f"{name} is inside {region} at {t:.1f} s with a margin of {short}"
+        stops = [*((s.region, s.t) for s in way.stops[d]), (task.homes[d], task.horizon)]
+        found = []
+        for region, t in stops:
+            k, faces = int(np.abs(times - t).argmin()), task.regions[region]
+            found.append(float((faces[:, 3] - positions[d, k] @ faces[:, :3].T).min()))
+        margin = min(found)
+        at = [f"{region} at {t:.1f} s" for region, t in stops]
+        where = f"{', '.join(at[:-1])} and {at[-1]}" if len(at) > 1 else at[0]
+        short = f"{margin:.2f} m, {task.tube - margin:.2f} m less than the tube asks"
+        yield margin, task.tube, f"{name} is in {where} with a margin of {short}"

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass, field, replace
 
 from fleet.assign import EXACT
 from fleet.errors import InfeasibleError, Need
@@ -62,13 +60,11 @@ class Trials:
         return self.known.get(clauses)
 
     def attempt(self, task: Problem) -> str | None:
-        """Plan a part: None when that worked, else why it did not."""
+        """Plan a part, weights aside: None when that worked, else why it did not."""
+        task = replace(task, weights={})
         try:
             bound = min(rho_bound(task), WIDEST)
-            try:
-                ways = list(schedules(sketched(task, bound), bound))
-            except InfeasibleError:
-                ways = list(schedules(task, bound))
+            ways = routed(task, bound)
         except InfeasibleError as error:
             return error.problems[0].message
         why = None
@@ -104,3 +100,16 @@ class Trials:
         world = survey(task, task.tube)
         reach = Reach(task, tuple(task.spec.visits), leg_times(task, world, None))
         yield from (m for m in needs(reach) if m.region not in task.homes or m.needs_s > m.by_s + 1e-9)
+
+
+def routed(task: Problem, bound: float) -> list[Itinerary]:
+    """Itineraries of a part, with the visits that its `rest` needs if that works.
+
+    Raises InfeasibleError when there is none.
+    """
+    if task.spec.rest:
+        try:
+            return list(schedules(sketched(task, bound), bound))
+        except InfeasibleError:
+            pass  # the convex steps may still find a way that the sketch did not
+    return list(schedules(task, bound))
