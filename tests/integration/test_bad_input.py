@@ -165,7 +165,8 @@ def test_infeasible_names_the_clause(fleet: Fleet, tmp_path: Path) -> None:
     answer = fleet("plan", str(path), "--json")
     answer.assert_no_traceback()
     assert answer.code == 3, answer.err
-    assert answer.json["conflict"] == "up"
+    assert answer.json["conflict"]["clauses"] == ["up"]
+    assert answer.json["conflict"]["proved"] is True
 
 
 def test_a_port_that_is_taken(fleet: Fleet, endpoint: str, tmp_path: Path) -> None:

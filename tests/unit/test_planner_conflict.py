@@ -229,10 +229,10 @@ box = [[15.0, -11.0, -1.0], [16.0, 11.0, 13.0]]
 def test_margins_that_are_missing_are_told(tmp_path: Path) -> None:
     """Both drones in one small place at one time, half by a formula that no rule looks into."""
     clauses = [
-        "@e eventually[20,20] d1 in east",
-        "@n always[20,20] (d2 in east or d2 in near and d1 in west)",
+        "@e eventually[15,15] d1 in east",
+        "@n always[15,15] (d2 in east or d2 in near and d1 in west)",
     ]
-    found = conflict_of(world(tmp_path, APART, *clauses, T=60.0))
+    found = conflict_of(world(tmp_path, APART, *clauses, T=30.0))
     assert not found.proved
     assert set(found.clauses) == {"apart", "e", "n"}
     assert "d1 and d2 keep 3 m apart with a margin of" in found.text

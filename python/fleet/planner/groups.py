@@ -192,3 +192,11 @@ def nonlinear(stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
 
     x, margins, _ = nlp.optimise(stage, None, progress)
     return x, margins
+
+
+def last_resort(stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
+    """The nonlinear program where convex steps have failed, with less patience."""
+    from . import nlp
+
+    x, margins, _ = nlp.optimise(stage, None, progress, nlp.LAST_PATIENCE)
+    return x, margins

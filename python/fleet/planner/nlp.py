@@ -38,6 +38,8 @@ GUIDE = 0.5
 MEASURED = 5e-3
 #: CPU time after which no further solve of clauses without a normal form starts, and longest of one [s].
 PATIENCE = 5.0
+#: The same where the nonlinear program is the last resort, so that a refusal does not take long [s].
+LAST_PATIENCE = 2.0
 #: Solves with further pieces posed, when a solution passes what was not posed.
 ROUNDS = 4
 
@@ -261,8 +263,10 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None, patien
         "print_time": False,
     }
     solver = ca.nlpsol("plan", "ipopt", statement, options)
-    guess = np.concatenate(program.guess)
+    guess, began = np.concatenate(program.guess), time.process_time()
     for factor in SHARPER if program.smoothed else (1.0,):
+        if task.spec.rest and time.process_time() - began > patience:
+            return None
         weight = SOFT if hold is None else 1.0
         parameters = [weight, -1e3 if hold is None else hold, factor * task.c]
         with unswallowed():
@@ -281,7 +285,10 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None, patien
 
 
 def optimise(
-    setup: Setup, start: Array | None = None, progress: Progress | None = None
+    setup: Setup,
+    start: Array | None = None,
+    progress: Progress | None = None,
+    patience: float = PATIENCE,
 ) -> tuple[Array, Margins, int]:
     """Maximise r, then minimise energy at the r reached, from the warm start or from `start`."""
     steps = Steps.of(setup)
@@ -295,8 +302,7 @@ def optimise(
         x, last = best, top
         for _ in range(ROUNDS):
             steps.rows(x, setup.bound if level is None else level)
-            patience = PATIENCE - (time.process_time() - began)
-            found = solve(steps, best, top, level, patience)
+            found = solve(steps, best, top, level, patience - (time.process_time() - began))
             count += 1
             if found is None:
                 break

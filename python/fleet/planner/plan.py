@@ -197,7 +197,7 @@ def attempts(task: Problem, ways: list[Itinerary], method: str) -> Iterator[Atte
     name = "convex" if method == "auto" else method
     yield from (Attempt(task, way, name, METHODS[name]) for way in ways)
     if method == "auto":
-        yield Attempt(task, ways[0], "nlp", METHODS["nlp"])
+        yield Attempt(task, ways[0], "nlp", groups.last_resort)
 
 
 def attempt(scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: Progress) -> Certified:
