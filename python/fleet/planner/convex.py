@@ -8,7 +8,7 @@ maximised, then energy is minimised at the r reached.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -16,7 +16,7 @@ from scipy import sparse
 from . import clearance as near
 from .duties import Duties
 from .knots import Array
-from .rows import Block, Limit, energy, stack
+from .rows import Block, energy, stack
 from .setup import SMOOTH, Setup, warm_start
 from .solver import Solution, solve
 from .weights import added, slack_of, weighed
@@ -129,37 +129,22 @@ def program(
     below: Sequence[Block],
     hold: float | None,
     weights: Mapping[int, float] = SMOOTH,
-    penalty: float | None = None,
 ) -> Solution | None:
     """The quadratic program of one step over all knots and r, the last unknown.
 
     With `hold` r is at least that [m] and the energy that `weights` weigh (by order of derivative) is
-    least; without, r is largest. With a `penalty` limits may be passed by a share of them, the last
-    unknown but one, at that many metres of r (or units of energy) a share.
+    least; without, r is largest.
     """
-    size = setup.grid.size + (penalty is not None)
+    size = setup.grid.size
     smooth = energy(setup.grid, {k: (SOFT if hold is None else 1.0) * w for k, w in weights.items()})
-    idle = sparse.csc_matrix((size + 1 - setup.grid.size,) * 2)
     linear = np.zeros(size + 1)
     linear[size] = 0.0 if hold is not None else -1.0
     slack = np.array([[size]])
     rows = [*below, Block(np.ones((1, 1)), slack, np.array([setup.bound]), np.zeros(1))]
     if hold is not None:
         rows.append(Block(-np.ones((1, 1)), slack, np.array([-hold]), np.zeros(1)))
-    if penalty is not None:
-        linear[size - 1] = penalty
-        rows = [loosened(b, size - 1) for b in rows]
-        rows.append(Block(-np.ones((1, 1)), slack - 1, np.zeros(1), np.zeros(1)))
-    quadratic = sparse.csc_matrix(sparse.block_diag([smooth, idle]))
+    quadratic = sparse.csc_matrix(sparse.block_diag([smooth, sparse.csc_matrix((1, 1))]))
     return solve(quadratic, linear, stack(setup.equal, size), stack(rows, size))
-
-
-def loosened(b: Block, column: int) -> Block:
-    """Rows of limits with a share of the limit, the unknown at `column`, added to it; others as they are."""
-    if not isinstance(b.origin, Limit):
-        return b
-    cols = np.hstack([b.cols, np.full((len(b.rhs), 1), column)])
-    return replace(b, vals=np.hstack([b.vals, -b.rhs[:, None]]), cols=cols)
 
 
 def better(a: Margins, b: Margins) -> bool:

@@ -29,6 +29,8 @@ from .spec import Invariant
 Progress = Callable[[str, float], None]
 #: One method: trajectories of a setup and their margins.
 Method = Callable[[Setup, Progress | None], tuple[Array, Margins]]
+#: What may move the visits of a setup for the sake of its trajectories: setup, trajectories and margins.
+Timing = Callable[[Setup, Array, Margins, Progress | None], tuple[Setup, Array, Margins]]
 
 #: Room around a route that its trajectory hardly ever leaves [m].
 ROOM = 2.0
@@ -36,8 +38,12 @@ ROOM = 2.0
 
 @dataclass(frozen=True)
 class Flight:
-    """Trajectories of all drones, margins over everything, integral of |a|^2 [m^2/s^3], time to build [s]."""
+    """Trajectories of all drones, margins over everything, integral of |a|^2 [m^2/s^3], time to build [s].
 
+    `way` is the itinerary that they fly.
+    """
+
+    way: Itinerary
     tracks: list[_core.Trajectory]
     margins: Margins
     int_a2: float
@@ -48,6 +54,7 @@ class Flight:
 class Solved:
     """One part: its trajectories, the boxes (2, k, 3) that hold them, margins, energy, time to build [s]."""
 
+    way: Itinerary
     tracks: list[_core.Trajectory]
     boxes: Array
     margins: Margins
@@ -56,9 +63,17 @@ class Solved:
 
 
 def fly(
-    task: Problem, way: Itinerary, bound: float, method: Method, progress: Progress | None = None
+    task: Problem,
+    way: Itinerary,
+    bound: float,
+    method: Method,
+    progress: Progress | None = None,
+    timing: Timing | None = None,
 ) -> Flight:
-    """Trajectories of an itinerary, part by part; a mission with `rest` is one part."""
+    """Trajectories of an itinerary, part by part; a mission with `rest` is one part.
+
+    `timing`, if given, has the last word on the visit times of each part.
+    """
     boxes = route_boxes(way)
     known: dict[tuple[tuple[int, ...], tuple[Invariant, ...]], Solved] = {}
     while True:
@@ -66,7 +81,7 @@ def fly(
         for members, kept in parts(task, boxes, bound):
             if (members, kept) not in known:
                 tell = lowest(progress, [s.margins.r for s in found.values()])
-                known[members, kept] = solve(task, way, members, kept, bound, method, tell)
+                known[members, kept] = solve(task, way, members, kept, bound, method, tell, timing)
             found[members] = known[members, kept]
         real = np.zeros_like(boxes)
         for members, solved in found.items():
@@ -80,7 +95,9 @@ def fly(
     whole = Margins(worst.r, worst.clause, share, tight.tube, tight.short)
     tracks = {d: t for members, s in found.items() for d, t in zip(members, s.tracks, strict=True)}
     energy, build = sum(s.int_a2 for s in found.values()), sum(s.build_s for s in known.values())
-    return Flight([tracks[d] for d in range(len(task.ids))], blamed(whole, margins), energy, build)
+    stops = {d: s for members, p in found.items() for d, s in zip(members, p.way.stops, strict=True)}
+    flown = replace(way, stops=tuple(stops[d] for d in range(len(task.ids))))
+    return Flight(flown, [tracks[d] for d in range(len(task.ids))], blamed(whole, margins), energy, build)
 
 
 def blamed(whole: Margins, margins: list[Margins]) -> Margins:
@@ -153,6 +170,7 @@ def solve(
     bound: float,
     method: Method,
     progress: Progress | None,
+    timing: Timing | None,
 ) -> Solved:
     """One part, planned alone."""
     begin = time.perf_counter()
@@ -161,9 +179,12 @@ def solve(
     stage = setup(part, own, bound)
     build = time.perf_counter() - begin
     x, margins = method(stage, progress)
+    if timing is not None:
+        stage, x, margins = timing(stage, x, margins, progress)
+    own = stage.itinerary
     tracks = [trajectory(part, own, stage.grid, x, d) for d in range(len(members))]
     boxes = hulls(stage.grid, x)
-    return Solved(tracks, boxes, margins, squared_acceleration(stage.grid, x), build)
+    return Solved(own, tracks, boxes, margins, squared_acceleration(stage.grid, x), build)
 
 
 def restricted(task: Problem, members: tuple[int, ...], kept: tuple[Invariant, ...]) -> Problem:

@@ -19,6 +19,7 @@ from .problem import Problem, problem
 from .result import PlanResult, result
 from .schedule import Itinerary, schedules
 from .sketch import sketched
+from .timing import raised
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
@@ -207,7 +208,9 @@ def attempt(scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: 
     the plan is too large for the wire.
     """
     tell("build", bound)
-    flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell)
+    moving = raised if one.method == "convex" else None
+    flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell, moving)
+    one = replace(one, way=flight.way)
     watch.lap("solve")
     watch.move(flight.build_s, "solve", "build")
     refuse(one.task, flight.margins)

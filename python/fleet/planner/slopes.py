@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .knots import KNOT, SAME_KNOT, Array, Grid, Ints, hermite, restriction
 from .rows import Block, Limit, Pull, derivative_maps, gram
@@ -31,27 +32,13 @@ def slopes(
     """
     out = [np.zeros(len(t)) for t in grid.times]
     for d in range(len(grid.times)):
-        stretch(out, grid, d, np.arange(len(grid.times[d]) - 1), energy_slope(grid, x, d, weights))
+        segments, values = np.arange(len(grid.times[d]) - 1), energy_slope(grid, x, d, weights)
+        np.add.at(out[d], segments + 1, values)
+        np.add.at(out[d], segments, -values)
     for block, z in rows:
-        if isinstance(block.origin, Limit):
-            where = block.origin
-            stretch(out, grid, where.drone, where.segments, limit_slope(grid, x, where, z))
-        elif block.origin:
-            for drone, knots, values in piece_slopes(grid, x, block.origin, z):
-                np.add.at(out[drone], knots, values)
+        for drone, knots, values in row_slopes(grid, x, block, z > IDLE * z.max(initial=0.0)):
+            np.add.at(out[drone], knots, z * values)
     return out
-
-
-def stretch(out: list[Array], grid: Grid, drone: int, segments: Ints, values: Array) -> None:
-    """Add derivatives (m,) by the durations of segments: a duration is the difference of two times."""
-    np.add.at(out[drone], segments + 1, values)
-    np.add.at(out[drone], segments, -values)
-
-
-def locals_of(grid: Grid, x: Array, drone: int, segments: Ints) -> Array:
-    """The two knots around each segment (m, 6, 3)."""
-    knots = grid.knots(x, drone)
-    return np.concatenate([knots[segments], knots[segments + 1]], axis=1)
 
 
 def energy_slope(grid: Grid, x: Array, drone: int, weights: Mapping[int, float]) -> Array:
@@ -69,59 +56,84 @@ def energy_slope(grid: Grid, x: Array, drone: int, weights: Mapping[int, float])
     return np.asarray((value(h * (1 + STEP)) - value(h * (1 - STEP))) / (2 * STEP * h))
 
 
-def limit_slope(grid: Grid, x: Array, where: Limit, z: Array) -> Array:
-    """Derivative (m,) of the rows of limits, times multipliers, by the durations of their segments."""
+def locals_of(grid: Grid, x: Array, drone: int, segments: Ints) -> Array:
+    """The two knots around each segment (m, 6, 3)."""
+    knots = grid.knots(x, drone)
+    return np.concatenate([knots[segments], knots[segments + 1]], axis=1)
+
+
+def row_slopes(
+    grid: Grid, x: Array, block: Block, wanted: NDArray[np.bool_]
+) -> Iterator[tuple[int, Ints, Array]]:
+    """Derivatives of the rows of a block by times of knots: (drone, knot (r,), derivative (r,)), to be added.
+
+    Rows of pieces and segments none of whose rows are `wanted` (r,) may be left at 0.
+    """
+    if isinstance(block.origin, Limit):
+        yield from limit_slopes(grid, x, block.origin)
+    elif block.origin and wanted.any():
+        busy = np.flatnonzero(wanted.reshape(-1, 6).any(axis=1))
+        for drone, knots, values in piece_slopes(grid, x, block.origin, busy):
+            all_knots, all_values = np.zeros(len(wanted), dtype=int), np.zeros((len(wanted) // 6, 6))
+            all_values[busy] = values
+            all_knots.reshape(-1, 6)[busy] = knots[:, None]
+            yield drone, all_knots, all_values.ravel()
+
+
+def limit_slopes(grid: Grid, x: Array, where: Limit) -> Iterator[tuple[int, Ints, Array]]:
+    """As `row_slopes`, of the rows of limits: a segment's duration is the difference of two times."""
     h = np.diff(grid.times[where.drone])[where.segments]
     local = locals_of(grid, x, where.drone, where.segments)
-    plus, minus = z.reshape(2, len(h), 6 - where.order, 3)
+    up, down = (derivative_maps(h * (1 + s), where.order) @ local for s in (STEP, -STEP))
+    values = (up - down) / (2 * STEP * h)[:, None, None]
+    both = np.concatenate([values, -values]).ravel()
+    segments = np.tile(np.repeat(where.segments, 3 * (6 - where.order)), 2)
+    yield where.drone, segments + 1, both
+    yield where.drone, segments, -both
 
-    def value(h: Array) -> Array:
-        return np.asarray(((plus - minus) * (derivative_maps(h, where.order) @ local)).sum(axis=(1, 2)))
 
-    return np.asarray((value(h * (1 + STEP)) - value(h * (1 - STEP))) / (2 * STEP * h))
-
-
-def piece_slopes(grid: Grid, x: Array, pulls: Sequence[Pull], z: Array) -> Iterator[tuple[int, Ints, Array]]:
-    """(drone, knots (m,), derivatives (m,)) of the rows of pieces, times multipliers.
+def piece_slopes(
+    grid: Grid, x: Array, pulls: Sequence[Pull], busy: Ints
+) -> Iterator[tuple[int, Ints, Array]]:
+    """As `row_slopes`, of the rows (m, 6) of some pieces.
 
     The ends of a piece move with the knot that they are at, else in proportion within their segment.
     """
-    each = z.reshape(-1, 6)
-    busy = np.flatnonzero(each.max(axis=1) > IDLE * max(float(z.max(initial=0.0)), 1e-300))
-    if len(busy) == 0:
-        return
-    each = each[busy]
-    ends = np.zeros((2, len(busy)))
+    ends = np.zeros((2, len(busy), 6))
     for pull in pulls:
-        pieces, force = pull.pieces.take(busy), each[:, :, None] * pull.ways[busy][:, None, :]
+        pieces = pull.pieces.take(busy)
         times = grid.times[pieces.drone]
         segments = (pieces.columns[:, 0] - grid.offsets[pieces.drone]) // KNOT
         local = x[pieces.columns].reshape(-1, 6, 3)
+        along = (local @ pull.ways[busy][:, :, None])[:, :, 0]
         at = np.stack([pieces.start, pieces.end, times[segments], times[segments + 1]])
-        parts = partials(at, local, force)
+        parts = partials(at, along)
         ends += parts[:2]
         yield pieces.drone, segments, parts[2]
         yield pieces.drone, segments + 1, parts[3]
     drones, first = [p.pieces.drone for p in pulls], pulls[0].pieces
     for t, values in ((first.start[busy], ends[0]), (first.end[busy], ends[1])):
         for drone, knots, share in carriers(grid, drones, t):
-            yield drone, knots, share * values
+            yield drone, knots, share[:, None] * values
 
 
-def partials(at: Array, local: Array, force: Array) -> Array:
-    """Derivatives (4, m) of `sum of force * control point` by start, end, and the two knots of a segment."""
+def partials(at: Array, along: Array) -> Array:
+    """Derivatives (4, m, 6) of control points by start, end and the two knots of a segment, `at` (4, m).
+
+    `along` (m, 6) are the values of the two knots in one direction.
+    """
 
     def value(at: Array) -> Array:
         h = at[3] - at[2]
-        points = restriction((at[0] - at[2]) / h, (at[1] - at[2]) / h) @ hermite(h) @ local
-        return np.asarray((force * points).sum(axis=(1, 2)))
+        maps = restriction((at[0] - at[2]) / h, (at[1] - at[2]) / h) @ hermite(h)
+        return np.asarray((maps @ along[:, :, None])[:, :, 0])
 
-    step, out = STEP * (at[3] - at[2]), np.empty_like(at)
+    step, out = STEP * (at[3] - at[2]), np.empty((4, *along.shape))
     for k in range(4):
         up, down = at.copy(), at.copy()
         up[k] += step
         down[k] -= step
-        out[k] = (value(up) - value(down)) / (2 * step)
+        out[k] = (value(up) - value(down)) / (2 * step[:, None])
     return out
 
 
