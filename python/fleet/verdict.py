@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet import _core
+from fleet.consumption import flown_energy
 from fleet.log.flight import DroneLog, Flight
 
 Array = NDArray[np.float64]
@@ -35,8 +36,8 @@ class DroneVerdict:
 
     `rmse_m`, `max_m`: truth against the committed reference over [0, T]; `rmse_plan_m`, `max_plan_m`: against
     the fleet plan. `min_clearance_m`: least signed distance to any obstacle from take-off to landing.
-    `gap_max_ms`: longest pause between two setpoints in flight. `end`: last mode the drone reported, `landed`
-    when it came down and disarmed.
+    `energy_J`: electrical energy of what was flown over [0, T]. `gap_max_ms`: longest pause between two
+    setpoints in flight. `end`: last mode the drone reported, `landed` when it came down and disarmed.
     """
 
     id: str
@@ -184,7 +185,7 @@ def _drone(plan: _core.Plan, drone: str, flight: Flight, track: Array) -> DroneV
         max_plan_m=worst_plan,
         replans=sum(1 for notice in log.replans if notice["outcome"] == "committed"),
         end=_end(flight, drone),
-        energy_J=None,
+        energy_J=flown_energy(track, horizon),
         min_clearance_m=_clearance(plan, _between(track, span)) if span else None,
         gap_max_ms=_gap(log, span) if span else None,
     )

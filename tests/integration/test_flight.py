@@ -28,7 +28,7 @@ CLAUSE = {"id", "text", "kind", "drones", "rho_planned", "rho_lower", "rho_flown
 DRONE = {"id", "rmse_m", "max_m", "replans", "end", "energy_J", "min_clearance_m", "gap_max_ms"}
 PLAN = [
     *("plan", "hash", "status", "method", "rho", "rho_lower", "rho_bound", "clauses", "assignment"),
-    *("events", "time_s", "int_a2", "energy_J", "conflict"),
+    *("events", "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict"),
 ]
 Fleet = Callable[..., Answer]
 

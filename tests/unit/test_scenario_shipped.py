@@ -18,7 +18,7 @@ def scenario(name):
 
 def test_all_are_there():
     names = {"hover", "power_tower", "power_tower_4", "power_tower_solo", "power_tower_gust", "crossing"}
-    assert names | {"multi_line"} <= set(NAMES)
+    assert names | {"multi_line", "power_tower_energy"} <= set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -98,6 +98,15 @@ def test_reference_geometry():
     assert all(
         region.inradius == pytest.approx(1.0) for region in (*large.targets, *(d.home for d in large.drones))
     )
+
+
+def test_power_tower_energy_has_the_papers_parameters():
+    """docs/paper.md, case EA; the geometry of power_tower."""
+    loaded, small = scenario("power_tower_energy"), scenario("power_tower")
+    assert (loaded.mission.T, loaded.mission.T_s, loaded.mission.c) == (110.0, 0.05, 5.0)
+    assert (loaded.limits.v_max, loaded.limits.a_max, loaded.limits.delta_min) == (3.0, 3.0, 3.0)
+    assert loaded.limits.tube == loaded.replan.eta == 0.3
+    assert loaded.regions() == small.regions()
 
 
 def test_crossing_is_coupled():

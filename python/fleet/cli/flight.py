@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,9 @@ from fleet.endpoint import DEFAULT_ENDPOINT, parse_endpoint
 from fleet.errors import Exit
 from fleet.faults import bad_input, environment
 from fleet.interrupt import Interrupt
+
+if TYPE_CHECKING:
+    from fleet import _core
 
 FLIGHT_KEYS = (
     "log", "report", "verdict", "rho_planned", "rho_flown", "min_pair_m", "sim_s", "wall_s", "clauses",
@@ -144,6 +147,10 @@ def report(
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="PNG", help="Also draw the flown paths as a picture.")
     ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option("--against", metavar="PLAN", help="Show the power of this plan beside the flight's."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write the report of a flight as one HTML file that needs no network.
@@ -157,15 +164,18 @@ def report(
         for file, field in ((path, "--output"), (picture, "--picture")):
             if file is not None and not file.parent.is_dir():
                 raise bad_input("file", "the folder does not exist", file=str(file), field=field)
+        other = None if against is None else _other_plan(against)
         from fleet import report as writer
         from fleet.log import read
         from fleet.verdict import judge
 
         with spinner(answer.err, f"reading {log.name}") as tell:
             flight = read(log)
+            if other is not None:
+                _same_drones(flight.plan, other, against)
             verdict = judge(flight)
             tell("writing")
-            writer.write(flight, verdict, path)
+            writer.write(flight, verdict, path, other)
             if picture is not None:
                 tell("drawing")
                 writer.draw(flight, picture)
@@ -173,6 +183,20 @@ def report(
         answer.scenario, answer.seed = flight.plan["scenario"], flight.plan["seed"]
         answer.fields |= {"log": str(log), "report": str(path), "verdict": show.word(verdict)}
         answer.say(f"report: {path}")
+
+
+def _other_plan(path: Path) -> _core.Plan:
+    """The plan to show beside the flight's."""
+    if files.kind(path) != "plan":
+        raise bad_input("plan", "is not a plan, as `fleet plan -o` writes", file=str(path), field="--against")
+    return files.read_plan(path).plan
+
+
+def _same_drones(plan: _core.Plan, other: _core.Plan, path: Path | None) -> None:
+    missing = {d["id"] for d in plan["drones"]} - {d["id"] for d in other["drones"]}
+    if missing:
+        text = f"has no drone {', '.join(sorted(missing))}; legal is a plan for the drones that flew"
+        raise bad_input("plan", text, file=str(path), field="--against")
 
 
 def _mission(answer: Reply, path: Path) -> tuple[files.PlanFile, str]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 PLAN_KEYS = (
     "plan", "hash", "status", "method", "rho", "rho_lower", "rho_bound", "clauses", "assignment", "events",
-    "time_s", "int_a2", "energy_J", "conflict",
+    "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict",
 )  # fmt: skip
 """Keys that `plan --json` adds (design.md, --json)."""
 METHODS = ("auto", "convex", "nlp", "rrt")
@@ -99,6 +99,11 @@ def plan_fields(result: PlanResult) -> dict[str, Any]:
         "time_s": dict(result.timings),
         "int_a2": result.int_a2,
         "energy_J": result.energy,
+        "hover_share": result.hover_share,
+        "drones": [
+            {"id": name, "energy_J": total, "hover_share": hover / total}
+            for name, (total, hover) in result.energies.items()
+        ],
     }
 
 

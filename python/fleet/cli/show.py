@@ -41,6 +41,7 @@ def plan(answer: Reply, plan: dict[str, Any], fields: dict[str, Any]) -> None:
         f"{plan['scenario']}: {plan['status']} ({plan['method']}), rho {_f(plan['rho'])} m, "
         f"continuous-time bound {_f(plan['rho_lower'])} m, upper bound {_f(plan['rho_bound'])} m"
     )
+    answer.say(f"energy: {_energies(fields)}; integral of |a|^2 {fields['int_a2']:.3f} m^2/s^3")
     answer.say(f"time: {spent}")
     if fields["plan"]:
         answer.say(f"plan: {fields['plan']}  sha256 {fields['hash'][:16]}...")
@@ -66,7 +67,7 @@ def verdict(answer: Reply, plan: Mapping[str, Any], verdict: Verdict) -> None:
     found = verdict.as_dict()
     columns = ("rho_planned", "rho_lower", "rho_flown", "t_tightest")
     answer.out.print(_clauses(plan, found["clauses"], columns))
-    per_drone = ("rmse_m", "max_m", "replans", "min_clearance_m", "gap_max_ms", "end")
+    per_drone = ("rmse_m", "max_m", "replans", "min_clearance_m", "energy_J", "gap_max_ms", "end")
     drones = _table("drone", *per_drone)
     for drone in found["drones"]:
         drones.add_row(drone["id"], *(_f(drone[column]) for column in per_drone))
@@ -77,6 +78,15 @@ def verdict(answer: Reply, plan: Mapping[str, Any], verdict: Verdict) -> None:
         f"{word(verdict)} (judged on {verdict.source}): rho flown {_f(verdict.rho_flown)} m, "
         f"planned {_f(verdict.rho_planned)} m, least pair distance {_f(verdict.min_pair_m)} m"
     )
+
+
+def _energies(fields: Mapping[str, Any]) -> str:
+    """Electrical energy of a plan: fleet, then drone by drone, with the share that hovering would take."""
+    fleet = f"{fields['energy_J'] / 1e3:.2f} kJ (hovering {100 * fields['hover_share']:.1f} %)"
+    each = [
+        f"{d['id']} {d['energy_J'] / 1e3:.2f} kJ ({100 * d['hover_share']:.1f} %)" for d in fields["drones"]
+    ]
+    return f"{fleet}: {', '.join(each)}" if len(each) > 1 else fleet
 
 
 _HEADS = {

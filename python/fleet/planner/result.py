@@ -42,7 +42,8 @@ class PlanResult:
 
     `plan` is the dict of `Plan`, `data` its bytes and `hash` their SHA-256; `rho`, `rho_lower`,
     `rho_bound` [m]; `timings` [s] of process, route, build, solve, certify; `int_a2` the integral of
-    |a|^2 over the fleet [m^2/s^3]; `assignment` targets of every drone in order; `events` one entry
+    |a|^2 over the fleet [m^2/s^3]; `energies` electrical energy of every drone, and of hovering for as
+    long [J] (crates/core, power); `assignment` targets of every drone in order; `events` one entry
     {drone, region, t, window, slack_s} a visit.
     """
 
@@ -58,7 +59,17 @@ class PlanResult:
     int_a2: float
     assignment: dict[str, list[str]]
     events: list[dict[str, Any]]
-    energy: float | None = None
+    energies: dict[str, tuple[float, float]]
+
+    @property
+    def energy(self) -> float:
+        """Electrical energy of the fleet [J]."""
+        return sum(total for total, _ in self.energies.values())
+
+    @property
+    def hover_share(self) -> float:
+        """Energy of hovering for as long over that of the plan; above 1 where flying is cheaper."""
+        return sum(hover for _, hover in self.energies.values()) / self.energy
 
     @property
     def bytes(self) -> bytes:
@@ -233,6 +244,7 @@ def result(
         rho_bound=reached,
         timings=timings,
         int_a2=int_a2,
+        energies={name: track.energy() for name, track in zip(problem.ids, tracks, strict=True)},
         assignment={name: [s.region for s in stops] for name, stops in flown},
         events=events,
     )

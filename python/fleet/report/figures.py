@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fleet import _core
+from fleet.consumption import flown_power, planned_power, sample_times
 from fleet.log.flight import Array, Flight
 from fleet.log.scene import hull_triangles, role, vertices
 from fleet.report import palette
@@ -142,6 +143,51 @@ def deviation(flight: Flight) -> go.Figure:
     figure.add_hline(y=plan["replan"]["eta"], line={"color": "#c00", "dash": "dash"}, annotation_text="eta")
     _finish(figure, "deviation [m]")
     return figure
+
+
+def power(flight: Flight, other: _core.Plan | None = None) -> go.Figure:
+    """Power over time of every drone, planned and flown, and planned by another plan of the same drones."""
+    plan = flight.plan
+    figure = go.Figure()
+    times = sample_times(plan["horizon"])
+    for index, drone in enumerate(plan["drones"]):
+        color, name = palette.drone_color(index), drone["id"]
+        flown = _flown(flight, name)
+        if len(flown) > 1:
+            _line(figure, times, flown_power(flown, times), f"{name} flown", color, "solid")
+        planned = planned_power(_core.Trajectory.from_list(drone["trajectory"]), times)
+        _line(figure, times, planned, f"{name} planned", color, "dash")
+        if other is not None:
+            track = _core.Trajectory.from_list(_drone_of(other, name)["trajectory"])
+            clock = sample_times(other["horizon"])
+            _line(figure, clock, planned_power(track, clock), f"{name} other plan", color, "dot")
+    hover = _core.hover_power()
+    figure.add_hline(y=hover, line={"color": "#888", "dash": "dash"}, annotation_text="hover")
+    _finish(figure, "electrical power [W]")
+    return figure
+
+
+def effort(flight: Flight, other: _core.Plan | None = None) -> go.Figure:
+    """|a|^2 over time, planned, of every drone: what the energy-aware plan makes small."""
+    figure = go.Figure()
+    for plan, name, dash in ((flight.plan, "planned", "solid"), (other, "other plan", "dot")):
+        if plan is None:
+            continue
+        times = sample_times(plan["horizon"])
+        for index, drone in enumerate(flight.plan["drones"]):
+            track = _core.Trajectory.from_list(_drone_of(plan, drone["id"])["trajectory"])
+            squared = (track.sample(times)[:, 6:9] ** 2).sum(axis=1)
+            _line(figure, times, squared, f"{drone['id']} {name}", palette.drone_color(index), dash)
+    _finish(figure, "|a|² [m²/s⁴]")
+    return figure
+
+
+def _drone_of(plan: _core.Plan, drone: str) -> _core.DronePlan:
+    return next(d for d in plan["drones"] if d["id"] == drone)
+
+
+def _line(figure: go.Figure, x: Array, y: Array, name: str, color: str, dash: str) -> None:
+    figure.add_trace(go.Scatter(x=x, y=y, name=name, line={"color": color, "dash": dash, "width": 1.3}))
 
 
 def _finish(figure: go.Figure, label: str) -> None:

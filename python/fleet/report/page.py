@@ -1,8 +1,11 @@
 """The report's HTML page."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 
+from fleet import _core
 from fleet.files import write_atomic
 from fleet.log.flight import Flight
 from fleet.verdict import Verdict
@@ -10,8 +13,10 @@ from fleet.verdict import Verdict
 _TEMPLATE = Path(__file__).with_name("page.html")
 
 
-def write(flight: Flight, verdict: Verdict, path: Path) -> None:
+def write(flight: Flight, verdict: Verdict, path: Path, other: _core.Plan | None = None) -> None:
     """Write the report of `flight` as one self-contained HTML file.
+
+    `other` is a plan of the same drones whose power is shown beside this one's.
 
     Raises:
         InputError: when the file cannot be written.
@@ -22,7 +27,9 @@ def write(flight: Flight, verdict: Verdict, path: Path) -> None:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["metres"] = _metres
-    page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(**_context(flight, verdict))
+    page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
+        **_context(flight, verdict, other)
+    )
     write_atomic(path, page.encode())
 
 
@@ -30,7 +37,29 @@ def _metres(value: float | None, digits: int = 2) -> str:
     return "–" if value is None else f"{value:.{digits}f}"
 
 
-def _context(flight: Flight, verdict: Verdict) -> dict[str, Any]:
+def _energies(flight: Flight, verdict: Verdict, other: _core.Plan | None) -> list[dict[str, Any]]:
+    """Energy of every drone in kJ: planned, share of hovering as long, of the other plan, flown."""
+
+    def planned(plan: _core.Plan, drone: str) -> tuple[float, float]:
+        part = next(d for d in plan["drones"] if d["id"] == drone)
+        return _core.Trajectory.from_list(part["trajectory"]).energy()
+
+    rows = []
+    for drone in verdict.drones:
+        total, hover = planned(flight.plan, drone.id)
+        rows.append(
+            {
+                "id": drone.id,
+                "planned": total / 1e3,
+                "hover": 100 * hover / total,
+                "other": None if other is None else planned(other, drone.id)[0] / 1e3,
+                "flown": None if drone.energy_J is None else drone.energy_J / 1e3,
+            }
+        )
+    return rows
+
+
+def _context(flight: Flight, verdict: Verdict, other: _core.Plan | None) -> dict[str, Any]:
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 
@@ -57,6 +86,9 @@ def _context(flight: Flight, verdict: Verdict) -> dict[str, Any]:
         "distance": embed(figures.distance(flight)),
         "robustness": embed(figures.robustness(flight)),
         "deviation": embed(figures.deviation(flight)),
+        "power": embed(figures.power(flight, other)),
+        "effort": embed(figures.effort(flight, other)),
+        "energies": _energies(flight, verdict, other),
         "replans": sorted(notices, key=lambda pair: (pair[1]["t_event"], pair[0])),
         "modes": [(t, i, mode, cause) for i, log in flight.drones.items() for t, mode, cause in log.modes],
     }
