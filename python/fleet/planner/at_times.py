@@ -136,7 +136,7 @@ def carries(stage: Setup) -> list[Array]:
     for d, stops in enumerate(stage.itinerary.stops):
         times, owner = anchors(stage.problem, stage.itinerary, d)
         each = [np.interp(stage.grid.times[d], times, (owner == k).astype(float)) for k in range(len(stops))]
-        out.append(np.array(each).reshape(len(stops), -1).T * stage.problem.sample)
+        out.append(np.array(each).reshape(len(stops), len(stage.grid.times[d])).T * stage.problem.sample)
     return out
 
 
