@@ -95,11 +95,14 @@ def test_at_any_moment_of_the_beginning(
         answer.assert_no_traceback()
 
 
-@pytest.mark.parametrize("delay", [1.0, 1.5, 2.0, 2.5])
-def test_while_planning(tmp_path: Path, delay: float) -> None:
+@pytest.mark.parametrize(
+    ("method", "delay"),
+    [("nlp", 1.0), ("nlp", 1.5), ("nlp", 2.0), ("nlp", 2.5), ("paper", 3.0), ("paper", 5.0)],
+)
+def test_while_planning(tmp_path: Path, method: str, delay: float) -> None:
     """Solvers in C must not swallow it: in the middle of IPOPT it was lost, and the command ended with 0."""
     slow = str(SCENARIOS / "power_tower_4.toml")
-    process = start("plan", slow, "--method", "nlp", "-o", "x.plan.cbor", "--json", cwd=tmp_path)
+    process = start("plan", slow, "--method", method, "-o", "x.plan.cbor", "--json", cwd=tmp_path)
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     answer = finish(process, 20.0)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 PLAN_KEYS = (
     "plan", "hash", "status", "method", "rho", "rho_lower", "rho_bound", "clauses", "assignment", "events",
-    "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict",
+    "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict", "notes",
 )  # fmt: skip
 """Keys that `plan --json` adds (design.md, --json)."""
-METHODS = ("auto", "convex", "nlp", "rrt")
+METHODS = ("auto", "convex", "nlp", "paper", "rrt")
 ScenarioArgument = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (.toml).")]
 
 
@@ -43,7 +43,11 @@ def plan(
         Path | None, typer.Option("-o", "--output", help="Write the plan to this file.")
     ] = None,
     method: Annotated[
-        str, typer.Option(help="How to plan: auto, convex, nlp, or rrt (a baseline: kinodynamic RRT*).")
+        str,
+        typer.Option(
+            help="How to plan: auto, convex, nlp; or a baseline: rrt (kinodynamic RRT*), "
+            "paper (log-sum-exp over samples, IPOPT; minutes)."
+        ),
     ] = "auto",
     as_json: Json = False,
 ) -> None:
@@ -104,6 +108,7 @@ def plan_fields(result: PlanResult) -> dict[str, Any]:
             {"id": name, "energy_J": total, "hover_share": hover / total}
             for name, (total, hover) in result.energies.items()
         ],
+        "notes": list(result.notes),
     }
 
 

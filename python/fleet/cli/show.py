@@ -42,6 +42,8 @@ def plan(answer: Reply, plan: dict[str, Any], fields: dict[str, Any]) -> None:
         f"continuous-time bound {_f(plan['rho_lower'])} m, upper bound {_f(plan['rho_bound'])} m"
     )
     answer.say(f"energy: {_energies(fields)}; integral of |a|^2 {fields['int_a2']:.3f} m^2/s^3")
+    for note in fields["notes"]:
+        answer.say(note)
     answer.say(f"time: {spent}")
     if fields["plan"]:
         answer.say(f"plan: {fields['plan']}  sha256 {fields['hash'][:16]}...")

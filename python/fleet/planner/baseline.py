@@ -21,11 +21,18 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Flown:
-    """Trajectories of all drones, the itinerary at the times that they keep, integral of |a|^2 [m^2/s^3]."""
+    """Trajectories of all drones, the itinerary at the times that they keep, integral of |a|^2 [m^2/s^3].
+
+    `build_s` time to build a program [s], `aside_s` time of attempts that were not kept, which do not count
+    as planning [s]; `notes` in words what people should know.
+    """
 
     tracks: list[_core.Trajectory]
     way: Itinerary
     int_a2: float
+    build_s: float = 0.0
+    aside_s: float = 0.0
+    notes: tuple[str, ...] = ()
 
 
 #: A baseline: from a scenario, its problem and the itinerary to start from to trajectories.
@@ -41,5 +48,17 @@ def kinodynamic_rrt(scenario: Scenario, task: Problem, way: Itinerary, progress:
     return Flown(tracks, made, squared_acceleration(grid, x))
 
 
+def log_sum_exp(scenario: Scenario, task: Problem, way: Itinerary, progress: Progress) -> Flown:
+    """The paper's formulation (paper.py); of its two solves only the time of the better one counts."""
+    from . import paper
+
+    formulas = [clause.formula for clause in scenario.clauses()]
+    grid, x, made, kept, others = paper.fly(task, formulas, way, progress)
+    tracks = [trajectory(task, made, grid, x, d) for d in range(len(task.ids))]
+    aside = sum(other.optimum.build_s + other.solve_s for other in others)
+    notes = (f"kept, {kept.describe()}", *(f"not kept, {other.describe()}" for other in others))
+    return Flown(tracks, made, squared_acceleration(grid, x), kept.optimum.build_s, aside, notes)
+
+
 #: Baselines by name of their method.
-BASELINES: dict[str, Baseline] = {"rrt": kinodynamic_rrt}
+BASELINES: dict[str, Baseline] = {"rrt": kinodynamic_rrt, "paper": log_sum_exp}

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from fleet.interrupt import unswallowed
 
 from . import clearance as near
+from .algebra import Score, Symbols
 from .convex import GIVEN_UP, SOFT, TOLERANCE, Margins, Steps, better
 from .knots import KNOT, Array, Grid, Pieces, difference, hermite
 from .problem import Problem
@@ -57,13 +58,15 @@ class Program:
     g_high: list[Array] = field(default_factory=list)
     smoothed: bool = False
 
-    def unknown(self, name: str, rows: int, columns: int, guess: Array, low: float, high: float) -> Any:
-        """A matrix of unknowns within bounds."""
+    def unknown(
+        self, name: str, rows: int, columns: int, guess: Array, low: float | Array, high: float | Array
+    ) -> Any:
+        """A matrix of unknowns within bounds: one for all, or one each."""
         symbol = ca.MX.sym(name, rows, columns)
         self.unknowns.append(ca.vec(symbol))
         self.guess.append(np.asarray(guess, dtype=float).reshape(rows, columns).ravel(order="F"))
-        self.low.append(np.full(rows * columns, low))
-        self.high.append(np.full(rows * columns, high))
+        self.low.append(np.broadcast_to(low, (rows, columns)).ravel(order="F"))
+        self.high.append(np.broadcast_to(high, (rows, columns)).ravel(order="F"))
         return symbol
 
     def constrain(self, expression: Any, low: float, high: float) -> None:
@@ -182,7 +185,7 @@ def pose_rest(
     step = max(1, round(GUIDE / task.sample)) * task.sample
     times = np.arange(round(task.horizon / step) + 1).astype(np.float64) * step
     positions = {n: sampled(grid, x, d, times) for d, n in enumerate(task.ids)}
-    walk = Smooth(positions, task.regions, step, parameters[2])
+    walk = Smooth(positions, task.regions, step, Symbols(Score.SOUND, parameters[2]))
     for part in task.spec.rest:
         column = walk.conjuncts(part.formula)
         program.smoothed |= ca.depends_on(column, parameters)

@@ -79,9 +79,9 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     """Plan a scenario: assign, route, optimise, certify; the first plan that satisfies it.
 
     `method` is "convex" (sequential convex steps), "nlp" (the nonlinear program, IPOPT) or "auto":
-    convex, then the nonlinear program where that fails; or a baseline, "rrt", whose plan is returned
-    even if it violates the mission. `progress(stage, rho)` is called at every stage. The same scenario
-    gives the same bytes.
+    convex, then the nonlinear program where that fails; or a baseline, "rrt" or "paper", whose plan
+    is returned even if it violates the mission. `progress(stage, rho)` is called at every stage. The
+    same scenario gives the same bytes.
 
     Raises InfeasibleError, naming a clause, when the mission cannot hold or nothing was found that
     keeps the tube's margins; InputError when the plan is too large for the wire; ValueError for an
@@ -149,6 +149,8 @@ def baseline(
     """The plan of a baseline, certified or violated."""
     flown = BASELINES[method](scenario, task, way, tell)
     watch.lap("solve")
+    watch.move(flown.build_s, "solve", "build")
+    watch.spent["solve"] -= flown.aside_s
     out = result(
         scenario,
         task,
@@ -160,7 +162,7 @@ def baseline(
         timings=watch.spent,
     )
     watch.lap("certify")
-    return replace(out, timings=dict(watch.spent))
+    return replace(out, timings=dict(watch.spent), notes=flown.notes)
 
 
 def better(a: PlanResult, b: PlanResult) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fleet import _core
-from fleet.certificate import Proof, prove
+from fleet.certificate import LOOSE, Proof, prove
 from fleet.errors import InputError
 from fleet.errors import Problem as Fault
 from fleet.stl.normal import drones_of
@@ -44,7 +44,7 @@ class PlanResult:
     `rho_bound` [m]; `timings` [s] of process, route, build, solve, certify; `int_a2` the integral of
     |a|^2 over the fleet [m^2/s^3]; `energies` electrical energy of every drone, and of hovering for as
     long [J] (crates/core, power); `assignment` targets of every drone in order; `events` one entry
-    {drone, region, t, window, slack_s} a visit.
+    {drone, region, t, window, slack_s} a visit; `notes` of a baseline, in words.
     """
 
     plan: dict[str, Any]
@@ -60,6 +60,7 @@ class PlanResult:
     assignment: dict[str, list[str]]
     events: list[dict[str, Any]]
     energies: dict[str, tuple[float, float]]
+    notes: tuple[str, ...] = ()
 
     @property
     def energy(self) -> float:
@@ -196,6 +197,12 @@ def timely(itinerary: Itinerary) -> bool:
     return all(s.visit.window[0] - 1e-6 <= s.t <= s.visit.window[1] + 1e-6 for s in stops)
 
 
+def moderate(problem: Problem, tracks: list[_core.Trajectory]) -> bool:
+    """Whether limits hold in continuous time, as `fleet verify` measures them."""
+    limits = np.array([[problem.v_max], [problem.a_max]]) * (1 + LOOSE)
+    return all(bool((np.stack(track.bounds()) <= limits).all()) for track in tracks)
+
+
 def result(
     scenario: Scenario,
     problem: Problem,
@@ -215,7 +222,8 @@ def result(
     proof = prove(list(problem.ids), scenario.regions(), clauses, tracks, problem.horizon, problem.sample)
     drones = [drone_plan(scenario, problem, itinerary, d, t) for d, t in enumerate(tracks)]
     plan = assemble(scenario, problem, drones, proof)
-    status = Status.CERTIFIED if proof.rho_lower > 0 and timely(itinerary) else Status.VIOLATED
+    sound = proof.rho_lower > 0 and timely(itinerary) and moderate(problem, tracks)
+    status = Status.CERTIFIED if sound else Status.VIOLATED
     if status is Status.CERTIFIED and proof.rho >= bound - AT_BOUND:
         status = Status.OPTIMAL
     reached = bound if np.isfinite(bound) else proof.rho
