@@ -7,6 +7,7 @@
     |   +-- FormulaError       a formula text, with line and column
     |   +-- LogError           a flight log that cannot be read
     +-- InfeasibleError      3 no plan can satisfy the mission; names the clause
+    +-- TimeLimitError       3 no plan was found in the time given; there may be one
     +-- EnvironmentError_    4 port, peer, process or version
     +-- InterruptedError_  130 stopped by the user with nothing kept
 
@@ -176,6 +177,13 @@ class InfeasibleError(FleetError):
         )
         self.clause = named[0] if named else None
         self.conflict = conflict
+
+
+class TimeLimitError(FleetError):
+    """No plan was found in the time given; that does not say that there is none."""
+
+    exit_code = Exit.INFEASIBLE
+    code = "time_limit"
 
 
 class EnvironmentError_(FleetError):  # noqa: N801  (the plain name is a built-in)

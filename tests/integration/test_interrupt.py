@@ -88,7 +88,8 @@ def test_at_any_moment_of_the_beginning(
     time.sleep(delay)
     flight.interrupt()
     answer = flight.end(15.0)
-    assert answer.code in {130, -signal.SIGINT}, answer.err
+    python_began = "Fatal Python error: init_" not in answer.err
+    assert answer.code in {130, -signal.SIGINT} or not python_began, answer.err
     assert not flight.run.exists()
     # Before its first own line runs, Python itself ends by the signal, and may say so with a traceback.
     if answer.code == 130:

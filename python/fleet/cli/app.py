@@ -55,8 +55,11 @@ def run(arguments: list[str]) -> int:
     try:
         app(arguments, prog_name="fleet")
     except SystemExit as end:
+        if SETTINGS.answered is not None:
+            # A signal after the answer does not change it.
+            return SETTINGS.answered
         code = end.code if isinstance(end.code, int) else 0 if end.code is None else 1
-        if code == 2 and "--json" in arguments and not SETTINGS.answered:
+        if code == 2 and "--json" in arguments:
             usage_error(arguments)
             sys.stdout.flush()
         return code

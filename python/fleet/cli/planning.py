@@ -13,8 +13,10 @@ from fleet import files
 from fleet.cli import show
 from fleet.cli.progress import bar, spinner
 from fleet.cli.reply import Json, Reply, reply
+from fleet.cli.searching import keep_best
 from fleet.errors import Exit, InfeasibleError
 from fleet.faults import bad_input
+from fleet.interrupt import Interrupt
 
 if TYPE_CHECKING:
     from fleet.planner import PlanResult
@@ -22,7 +24,8 @@ if TYPE_CHECKING:
 
 PLAN_KEYS = (
     "plan", "hash", "status", "method", "rho", "rho_lower", "rho_bound", "clauses", "assignment", "events",
-    "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict", "notes",
+    "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict", "notes", "history", "ended",
+    "memory_mb",
 )  # fmt: skip
 """Keys that `plan --json` adds (design.md, --json)."""
 METHODS = ("auto", "convex", "nlp", "paper", "rrt")
@@ -49,18 +52,28 @@ def plan(
             "paper (log-sum-exp over samples, IPOPT; minutes)."
         ),
     ] = "auto",
+    time_limit: Annotated[
+        float | None,
+        typer.Option("--time-limit", help="Look for better plans for this long, seconds of planning."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Plan a mission and prove that the plan satisfies it.
 
+    The first certified plan is the answer, always the same one. With --time-limit better ones (larger rho, to
+    1 mm; then less energy) take its place while there is time. Ctrl-C keeps the best plan so far.
+
     Example: fleet plan scenarios/power_tower.toml -o power_tower.plan.cbor
+
+    Example: fleet plan scenarios/crossing.toml --time-limit 10 -o crossing.plan.cbor
     """
-    with reply("plan", as_json=as_json, keys=PLAN_KEYS) as answer:
+    interrupt = Interrupt()
+    with interrupt.installed(), reply("plan", as_json=as_json, keys=PLAN_KEYS) as answer:
         loaded = files.read_scenario(scenario)
         answer.scenario, answer.seed = loaded.name, loaded.mission.seed
         if not as_json:
             show.formula(answer, loaded.clauses())
-        result = make_plan(answer, loaded, method)
+        result = make_plan(answer, loaded, method, interrupt, time_limit)
         answer.fields |= plan_fields(result)
         if output is not None:
             files.write_atomic(output, result.bytes)
@@ -70,8 +83,17 @@ def plan(
             show.plan(answer, result.plan, answer.fields)
 
 
-def make_plan(answer: Reply, scenario: Scenario, method: str = "auto") -> PlanResult:
-    """Plan with progress on stderr; an infeasible mission leaves why in `conflict`."""
+def make_plan(
+    answer: Reply,
+    scenario: Scenario,
+    method: str = "auto",
+    interrupt: Interrupt | None = None,
+    time_limit: float | None = None,
+) -> PlanResult:
+    """Plan with progress on stderr; an infeasible mission leaves why in `conflict`.
+
+    With `interrupt` its signals keep the best plan so far (`keep_best`).
+    """
     from fleet import planner
 
     if method not in METHODS:
@@ -79,6 +101,8 @@ def make_plan(answer: Reply, scenario: Scenario, method: str = "auto") -> PlanRe
             "method", f"{method!r} is not a method; legal is {', '.join(METHODS)}", field="--method"
         )
     try:
+        if interrupt is not None:
+            return keep_best(answer, interrupt, scenario, method, time_limit)
         with spinner(answer.err, f"planning {scenario.name}") as tell:
             return planner.plan(
                 scenario,

@@ -31,10 +31,10 @@ Json = Annotated[
 
 @dataclass
 class Settings:
-    """Options of `fleet` itself, and whether any command has answered."""
+    """Options of `fleet` itself, and the exit code of the command that has answered, if one has."""
 
     debug: bool = False
-    answered: bool = False
+    answered: int | None = None
 
 
 SETTINGS = Settings()
@@ -100,10 +100,10 @@ def reply(command: str, *, as_json: bool, keys: tuple[str, ...] = ()) -> Iterato
         raise
     except Exception as error:  # noqa: BLE001 - the boundary: a defect must end in a message as well
         _defect(answer, error)
-    SETTINGS.answered = True
     if as_json:
         sys.stdout.write(json.dumps(answer.as_dict(), allow_nan=False) + "\n")
         sys.stdout.flush()
+    SETTINGS.answered = answer.exit
     raise typer.Exit(answer.exit)
 
 

@@ -68,16 +68,20 @@ class Steps:
         return cls(setup, within, beyond, apart, bounds, duties)
 
     def rows(self, x: Array, level: float, lift: Array | None = None) -> list[Block]:
-        """Rows that can matter near the trajectory `x` when r may reach `level`."""
+        """Rows that can matter near the trajectory `x` when r may reach `level`.
+
+        `lift` (3,), or (pairs, 3) one each, tilts the planes of pairs in conflict.
+        """
         wanted, tube = self.setup.bound, self.setup.problem.tube
         blocks = [*self.visits(level), *self.bounds.rows(x)]
         for w in self.within:
             blocks += self.asked(w.clause, near.inside_rows(w, x, wanted), level)
         for w in self.beyond:
             blocks += self.asked(w.clause, near.outside_rows(w, x, wanted), level)
-        for w in self.apart:
-            weight = self.setup.problem.weight(w.clause)
-            blocks += weighed(near.apart_rows(w, x, wanted, weight * level, tube, lift), weight)
+        tilts = np.broadcast_to(np.zeros(3) if lift is None else lift, (len(self.apart), 3))
+        for w, tilt in zip(self.apart, tilts, strict=True):
+            weight, own = self.setup.problem.weight(w.clause), None if lift is None else tilt
+            blocks += weighed(near.apart_rows(w, x, wanted, weight * level, tube, own), weight)
         blocks += self.duties.rows(x, wanted, level)
         return blocks
 
@@ -152,12 +156,19 @@ def better(a: Margins, b: Margins) -> bool:
     return (a.share <= 1.0, a.r) > (b.share <= 1.0, b.r)
 
 
-def climb(steps: Steps, x: Array, lift: Sequence[float]) -> tuple[Array, Margins, int]:
-    """Maximise r from `x`; returns the best trajectory, its margins, and the number of steps."""
+def climb(
+    steps: Steps, x: Array, lift: Array | Sequence[float] = (), progress: Progress | None = None
+) -> tuple[Array, Margins, int]:
+    """Maximise r from `x`; returns the best trajectory, its margins, and the number of steps.
+
+    `lift`, if there is any, tilts the planes of pairs in conflict in the first step (`Steps.rows`).
+    """
+    tilt = np.asarray(lift) if np.any(lift) else None
     best, top = x, steps.margins(x)
-    tilt = np.array(lift) if any(lift) else None
     stalled = 0
     for count in range(1, STEPS + 1):
+        if progress is not None:
+            progress("solve", top.r)
         moved = steps.step(x, None, tilt if count == 1 else None)
         if moved is None:
             return best, top, count
@@ -170,11 +181,15 @@ def climb(steps: Steps, x: Array, lift: Sequence[float]) -> tuple[Array, Margins
     return best, top, count
 
 
-def polish(steps: Steps, x: Array, reached: Margins) -> tuple[Array, Margins, int]:
+def polish(
+    steps: Steps, x: Array, reached: Margins, progress: Progress | None = None
+) -> tuple[Array, Margins, int]:
     """Minimise energy at r within `GIVEN_UP` of what was reached, pairs at least as far as the tube asks."""
     hold = reached.r - GIVEN_UP
     best, top = x, reached
     for count in range(1, POLISH + 3):
+        if progress is not None:
+            progress("polish", top.r)
         moved = steps.step(best, hold)
         if moved is None:
             return best, top, count
@@ -201,14 +216,13 @@ def optimise(setup: Setup, progress: Progress | None = None) -> tuple[Array, Mar
     count = 0
     for lift in LIFTS:
         steps = Steps.of(setup)
-        x, margins, used = climb(steps, start, lift)
+        x, margins, used = climb(steps, start, lift, progress)
         count += used
         if chosen is None or better(margins, chosen[1]):
             chosen = (x, margins, steps)
-        if progress is not None:
-            progress("solve", chosen[1].r)
         if (margins.share <= 1 and margins.r >= setup.bound - 10 * TOLERANCE) or not blames_pair(chosen):
             break
     assert chosen is not None
-    x, margins, used = polish(chosen[2], chosen[0], chosen[1]) if chosen[1].share <= 1 else (*chosen[:2], 0)
+    best, top, steps = chosen
+    x, margins, used = polish(steps, best, top, progress) if top.share <= 1 else (best, top, 0)
     return x, margins, count + used

@@ -11,18 +11,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet.interrupt import unswallowed
-
 from . import clearance as near
 from .algebra import Score, Symbols
 from .convex import GIVEN_UP, SOFT, TOLERANCE, Margins, Steps, better
 from .knots import KNOT, Array, Grid, Pieces, difference, hermite
+from .listening import Listener
 from .problem import Problem
 from .rows import Block, gram, stack
 from .setup import SMOOTH, Setup, warm_start
@@ -244,8 +244,18 @@ def build(steps: Steps, now: Array, margins: Margins, level: float) -> tuple[Pro
     return program, -r + p[0] * cost, p
 
 
-def solve(steps: Steps, now: Array, margins: Margins, hold: float | None, patience: float) -> Array | None:
-    """One solve, sharpening smooth robustness if there is any; None unless IPOPT succeeded."""
+def solve(
+    steps: Steps,
+    now: Array,
+    margins: Margins,
+    hold: float | None,
+    patience: float,
+    tell: Callable[[], None] | None = None,
+) -> Array | None:
+    """One solve, sharpening smooth robustness if there is any; None unless IPOPT succeeded.
+
+    `tell` is called after every iteration, and what it raises ends the solve.
+    """
     task = steps.setup.problem
     program, objective, p = build(steps, now, margins, steps.setup.bound if hold is None else hold)
     statement = {"x": ca.vertcat(*program.unknowns), "f": objective, "g": ca.vertcat(*program.g), "p": p}
@@ -265,6 +275,8 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None, patien
         },
         "print_time": False,
     }
+    sizes = (statement["x"].numel(), statement["g"].numel(), p.numel())
+    options["iteration_callback"] = listener = Listener("listener", sizes)
     solver = ca.nlpsol("plan", "ipopt", statement, options)
     guess, began = np.concatenate(program.guess), time.process_time()
     for factor in SHARPER if program.smoothed else (1.0,):
@@ -272,7 +284,7 @@ def solve(steps: Steps, now: Array, margins: Margins, hold: float | None, patien
             return None
         weight = SOFT if hold is None else 1.0
         parameters = [weight, -1e3 if hold is None else hold, factor * task.c]
-        with unswallowed():
+        with listener.listening(tell):
             found = solver(
                 x0=guess,
                 p=parameters,
@@ -305,13 +317,12 @@ def optimise(
         x, last = best, top
         for _ in range(ROUNDS):
             steps.rows(x, setup.bound if level is None else level)
-            found = solve(steps, best, top, level, patience - (time.process_time() - began))
+            tell = None if progress is None else partial(progress, "nlp", top.r)
+            found = solve(steps, best, top, level, patience - (time.process_time() - began), tell)
             count += 1
             if found is None:
                 break
             now = steps.margins(found)
-            if progress is not None:
-                progress("solve", now.r)
             good = now.share <= 1 and now.r >= level - MEASURED if level is not None else better(now, top)
             done = now.r >= (setup.bound - TOLERANCE if level is None else level - MEASURED)
             if good:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from fleet import _core
 from fleet.assign import EXACT
 from fleet.errors import InfeasibleError, InputError
 
@@ -15,64 +13,24 @@ from . import convex, groups
 from .baseline import BASELINES
 from .ceiling import rho_bound, slack_bound
 from .conflict import Court
+from .improve import Attempt, Certified, Lead, improvements
 from .problem import Problem, problem
+from .progress import Progress, TimeUp
 from .result import PlanResult, result
 from .schedule import Itinerary, schedules
 from .sketch import sketched
 from .timing import raised
+from .watch import Watch
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
-
-#: Called with the stage and the robustness reached in it [m]; what it raises ends the planning.
-Progress = Callable[[str, float], None]
 
 #: Planning methods by name.
 METHODS: dict[str, groups.Method] = {"convex": groups.steps, "nlp": groups.nonlinear}
 #: Clearance that is worth while when no clause bounds rho [m].
 WIDEST = 5.0
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One thing to try: an itinerary of a problem, how to fly it, and the name of that method."""
-
-    task: Problem
-    way: Itinerary
-    method: str
-    run: groups.Method
-
-
-@dataclass(frozen=True)
-class Certified:
-    """A plan that satisfies the mission, the attempt that made it, and its trajectories."""
-
-    result: PlanResult
-    attempt: Attempt
-    tracks: list[_core.Trajectory]
-
-
-@dataclass
-class Watch:
-    """Where the time went [s]; `mark` is the end of the last part."""
-
-    spent: dict[str, float] = field(
-        default_factory=lambda: (
-            {"process": time.process_time()} | dict.fromkeys(("route", "build", "solve", "certify"), 0.0)
-        )
-    )
-    mark: float = field(default_factory=time.perf_counter)
-
-    def lap(self, part: str) -> None:
-        """Count the time since the last lap for `part`."""
-        now = time.perf_counter()
-        self.spent[part] += now - self.mark
-        self.mark = now
-
-    def move(self, seconds: float, one: str, other: str) -> None:
-        """Count some of the time of `one` for `other`."""
-        self.spent[one] -= seconds
-        self.spent[other] += seconds
+#: Share of energy whose saving makes a plan a better one.
+WORTH = 1e-3
 
 
 def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = "auto") -> PlanResult:
@@ -87,27 +45,28 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
     keeps the tube's margins; InputError when the plan is too large for the wire; ValueError for an
     unknown method.
     """
-    return next(improving(scenario, progress=progress, method=method))
+    return next(improving(scenario, progress=progress, method=method, further=False))
 
 
 def improving(
-    scenario: Scenario, *, progress: Progress | None = None, method: str = "auto"
+    scenario: Scenario, *, progress: Progress | None = None, method: str = "auto", further: bool = True
 ) -> Iterator[PlanResult]:
     """Certified plans, each better than the one before; the first is the one of `plan`.
 
-    Raises as `plan` does.
+    With `further` attempts go on where those of `plan` end. Raises as `plan` does, and what
+    `progress` raises.
     """
     if method not in ("auto", *METHODS, *BASELINES):
         raise ValueError(f"method is {method!r}; legal are {', '.join(('auto', *METHODS, *BASELINES))}")
     watch = Watch()
     court = Court(scenario, problem(scenario))
     try:
-        yield from search(court, progress or (lambda stage, rho: None), method, watch)
+        yield from search(court, progress or (lambda stage, rho: None), method, watch, further=further)
     except InfeasibleError as error:
         raise court.verdict(error) from None
 
 
-def search(court: Court, tell: Progress, method: str, watch: Watch) -> Iterator[PlanResult]:
+def search(court: Court, tell: Progress, method: str, watch: Watch, *, further: bool) -> Iterator[PlanResult]:
     """The plans of `improving`.
 
     Raises InfeasibleError at the first sign of trouble if a conflict is proved, and when nothing was found.
@@ -122,23 +81,27 @@ def search(court: Court, tell: Progress, method: str, watch: Watch) -> Iterator[
     if method in BASELINES:
         yield baseline(scenario, task, ways[0], method, bound, watch, tell)
         return
-    best: Certified | None = None
-    for one in attempts(task, ways, method):
+    lead = Lead()
+    seed = scenario.mission.seed if further else None
+    for one in tries(task, ways, wanted(task), method, lead, seed):
         try:
             found = attempt(scenario, one, bound, watch, tell)
         except InfeasibleError as error:
             refusal = refusal or error
-            if best is None:
+            if lead.best is None:
                 court.refuse_proved()
             continue
         except InputError:
-            if best is None:
+            if lead.best is None:
                 raise
             continue  # a further plan that the wire does not carry
-        if best is None or better(found.result, best.result):
-            best = found
+        except TimeUp as end:
+            end.refusal = refusal
+            raise
+        if lead.best is None or better(found.result, lead.best.result):
+            lead.best = found
             yield found.result
-    if best is None:
+    if lead.best is None:
         assert refusal is not None, "there is always an attempt, or schedules raises"
         raise refusal
 
@@ -165,11 +128,32 @@ def baseline(
     return replace(out, timings=dict(watch.spent), notes=flown.notes)
 
 
+def tries(
+    task: Problem, ways: list[Itinerary], bound: float, method: str, lead: Lead, seed: int | None
+) -> Iterator[Attempt]:
+    """The attempts of `plan` until one leads, then with a `seed` those that may beat it."""
+    for one in attempts(task, ways, method):
+        yield one
+        if lead.best is not None:
+            break
+    if seed is not None:
+        yield from improvements(task, ways, bound, method, lead, seed)
+
+
 def better(a: PlanResult, b: PlanResult) -> bool:
-    """Whether plan a is better than plan b: by status, weighted rho to 1 mm, then the integral of |a|^2."""
+    """Whether plan a is better than plan b: by status, weighted rho to 1 mm, then the integral of |a|^2.
+
+    Less than `WORTH` of energy does not count.
+    """
     ranks = ("violated", "certified", "optimal")
-    one, other = ((ranks.index(p.status), round(weighted_rho(p), 3), -p.int_a2) for p in (a, b))
-    return one > other
+    one, other = ((ranks.index(p.status), round(worth_rho(p), 3)) for p in (a, b))
+    return one > other or (one == other and a.int_a2 < (1 - WORTH) * b.int_a2)
+
+
+def worth_rho(found: PlanResult) -> float:
+    """The weighted robustness [m] that plans are compared by: nothing above what energy is saved at."""
+    rho = weighted_rho(found)
+    return min(rho, found.rho_bound - convex.GIVEN_UP) if rho == found.rho else rho
 
 
 def weighted_rho(found: PlanResult) -> float:
