@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .knots import Array, Grid, Ints, Pieces, cut, merge, refine, restriction
 from .problem import CLOSING, Problem
-from .rows import Block, derivative_points, half_spaces, limits, pieces_inside, separation
+from .rows import Block, derivative_points, half_spaces, limits, separation
 from .spec import Invariant
 
 #: Pieces of a segment that may lie beyond different faces of one obstacle.
@@ -34,7 +34,7 @@ GILBERT = 60
 
 @dataclass
 class Watch:
-    """One constraint, its pieces, and which of them have been posed so far."""
+    """One constraint, its pieces, and which of them (m,), or of their faces (m, n), are posed so far."""
 
     clause: str
     drones: tuple[int, ...]
@@ -66,7 +66,11 @@ def watches(problem: Problem, grid: Grid) -> tuple[list[Watch], list[Watch], lis
         posed = np.zeros(len(pieces.start), dtype=bool)
         faces = np.array([[-inv.row[0], -inv.row[1], -inv.row[2], inv.row[3]]])
         faces = faces if inv.kind == "linear" else problem.regions[inv.region]
-        (beyond if inv.kind == "outside" else within).append(Watch(inv.clause, (d,), posed, (pieces,), faces))
+        if inv.kind == "outside":
+            beyond.append(Watch(inv.clause, (d,), posed, (pieces,), faces))
+        else:
+            each = np.zeros((len(posed), len(faces)), dtype=bool)
+            within.append(Watch(inv.clause, (d,), each, (pieces,), faces))
     for a, b, inv in problem.pairs():
         apart.append(pair_watch(grid, a, b, inv))
     return within, beyond, apart
@@ -83,16 +87,17 @@ def pair_watch(grid: Grid, a: int, b: int, inv: Invariant) -> Watch:
 
 
 def inside_margin(w: Watch, x: Array) -> Array:
-    """Margin (m,) of each piece inside the faces."""
+    """Margin (m, n) of each piece inside each face."""
     points = w.pieces[0].points(x)
-    return np.asarray((w.faces[:, 3] - points @ w.faces[:, :3].T).min(axis=(1, 2)))
+    return np.asarray((w.faces[:, 3] - points @ w.faces[:, :3].T).min(axis=1))
 
 
 def inside_rows(w: Watch, x: Array, wanted: float) -> Iterator[Block]:
-    """Rows of the pieces that come near a face."""
+    """Rows of the pieces that come near a face, by that face."""
     w.posed |= inside_margin(w, x) < wanted + NEAR
-    if w.posed.any():
-        yield pieces_inside(w.pieces[0].take(np.flatnonzero(w.posed)), w.faces)
+    piece, face = np.nonzero(w.posed)
+    if len(piece):
+        yield half_spaces(w.pieces[0].take(piece), -w.faces[face, :3], -w.faces[face, 3])
 
 
 def outside_margin(w: Watch, x: Array) -> tuple[Array, Ints]:

@@ -173,12 +173,13 @@ class Duties:
             start = end - self.problem.sample
         parts = near.PARTS if inv.kind == "outside" else 1
         pieces = self.pieces(inv.drones, start, end, parts)
-        seen = np.ones(len(pieces[0].start), dtype=bool)
         numbers = tuple(self.problem.number(d) for d in inv.drones)
         faces = np.array([[-inv.row[0], -inv.row[1], -inv.row[2], inv.row[3]]])
         faces = faces if inv.kind in ("linear", "apart") else self.problem.regions[inv.region]
         kind = {"outside": posed.beyond, "apart": posed.apart}.get(inv.kind, posed.within)
-        normals = np.zeros((len(seen), 3))
+        count = len(pieces[0].start)
+        seen = np.ones(count if inv.kind in ("outside", "apart") else (count, len(faces)), dtype=bool)
+        normals = np.zeros((count, 3))
         kind.append(near.Watch(inv.clause, numbers, seen, pieces, faces, inv.value, normals))
 
     def pieces(self, drones: tuple[str, ...], start: float, end: float, parts: int = 1) -> tuple[Pieces, ...]:

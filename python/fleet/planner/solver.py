@@ -33,20 +33,24 @@ def solve(
     """Minimum of `x' P x / 2 + q' x` with `A x = b` and `G x <= h`; None unless solved and checked."""
     import clarabel
 
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_iter = MAX_ITERATIONS
-    settings.max_threads = 1
     matrix = sparse.vstack([equal[0], below[0]], format="csc")
     rhs = np.concatenate([equal[1], below[1]])
     cones = [clarabel.ZeroConeT(len(equal[1])), clarabel.NonnegativeConeT(len(below[1]))]
     upper = sparse.triu(quadratic, format="csc")
-    outcome = clarabel.DefaultSolver(upper, linear, matrix, rhs, cones, settings).solve()
-    if outcome.status != clarabel.SolverStatus.Solved:
-        return None
-    x = np.asarray(outcome.x)
-    residual = np.abs(equal[0] @ x - equal[1]).max(initial=0.0)
-    excess = (below[0] @ x - below[1]).max(initial=0.0)
-    if max(residual, excess) > ROW_TOLERANCE or not np.isfinite(x).all():
-        return None
-    return Solution(x, np.asarray(outcome.z)[len(equal[1]) :], float(outcome.obj_val))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_iter = MAX_ITERATIONS
+    settings.max_threads = 1
+    # Iterative refinement is two fifths of the time and hardly ever needed; the rows are checked anyway.
+    for refined in (False, True):
+        settings.iterative_refinement_enable = refined
+        outcome = clarabel.DefaultSolver(upper, linear, matrix, rhs, cones, settings).solve()
+        if outcome.status == clarabel.SolverStatus.PrimalInfeasible:
+            return None
+        x = np.asarray(outcome.x)
+        residual = np.abs(equal[0] @ x - equal[1]).max(initial=0.0)
+        excess = (below[0] @ x - below[1]).max(initial=0.0)
+        holds = max(residual, excess) <= ROW_TOLERANCE and bool(np.isfinite(x).all())
+        if outcome.status == clarabel.SolverStatus.Solved and holds:
+            return Solution(x, np.asarray(outcome.z)[len(equal[1]) :], float(outcome.obj_val))
+    return None
