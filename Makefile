@@ -7,7 +7,7 @@ RUST   := $(shell find crates sim -name '*.rs' -o -name Cargo.toml) Cargo.toml C
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python check format lock bench bench-plan bench-replan bench-tick bench-sim clean
+.PHONY: help setup demo test test-rust test-python check format lock bench bench-plan bench-replan bench-tick bench-sim bench-peers clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  \1\t/' | expand -t 18
@@ -65,6 +65,14 @@ bench-tick: ## One agent tick
 
 bench-sim: setup ## Virtual-time flights against real time
 	$(BIN)/python -m tests.bench.sim
+
+target/peers/.built: tests/bench/peers/requirements.txt
+	$(PYTHON) -m venv target/peers
+	target/peers/bin/pip install --quiet --requirement tests/bench/peers/requirements.txt
+	@touch $@
+
+bench-peers: setup target/peers/.built ## fleet against stlpy on the same missions (an environment of its own, half an hour)
+	$(BIN)/python -m tests.bench.peers target/peers/bin/python
 
 clean: ## Remove everything that is built
 	rm -rf target $(VENV) fleet.data runs python/fleet/_core*.so
