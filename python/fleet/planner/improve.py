@@ -23,9 +23,12 @@ from .reorder import reordered, shifted
 from .result import PlanResult, squared_acceleration
 from .schedule import Itinerary
 from .setup import MOST_SEGMENTS, Setup, warm_start
+from .timing import raised, retime
 
 #: Energy steps of one attempt at most, and the share that a step has to save for another one.
 POLISHING, SAVED = 10, 1e-3
+#: Robustness given up where visits move [m]: far below the millimetre that counts.
+HAIR = 1e-5
 #: Shortest segment that finer knots come down to [s].
 FINEST = 0.2
 #: Random attempts in a row without a better plan after which one at its bound is left as it is.
@@ -36,12 +39,16 @@ SHIFT = 0.08
 
 @dataclass(frozen=True)
 class Attempt:
-    """One thing to try: an itinerary of a problem, how to fly it, and the name of that method."""
+    """One thing to try: an itinerary of a problem, how to fly it, and the name of that method.
+
+    `timing`, if there is one, has the last word on the visit times.
+    """
 
     task: Problem
     way: Itinerary
     method: str
     run: groups.Method
+    timing: groups.Timing | None = None
 
 
 @dataclass(frozen=True)
@@ -71,13 +78,14 @@ def improvements(
         return
     if lead.best is not None:
         yield again(lead, "convex", polished)
+        yield replace(again(lead, "convex", polished), timing=thriftier)
     for way in ways[1:]:
-        yield Attempt(task, way, "convex", climbed)
+        yield Attempt(task, way, "convex", climbed, raised)
     if task.pairs():
         for lift in convex.LIFTS[1:]:
-            yield Attempt(task, ways[0], "convex", partial(climbed, lift=lift))
+            yield Attempt(task, ways[0], "convex", partial(climbed, lift=lift), raised)
     for way in reordered(task, ways[0], bound):
-        yield Attempt(task, way, "convex", climbed)
+        yield Attempt(task, way, "convex", climbed, thriftier)
     while lead.best is not None:
         before = lead.best
         yield from refined(lead, nonlinear=method != "convex")
@@ -90,6 +98,7 @@ def refined(lead: Lead, *, nonlinear: bool) -> Iterator[Attempt]:
     """The lead's own trajectories, made better by other means."""
     assert lead.best is not None
     yield again(lead, "convex", polished)
+    yield replace(again(lead, "convex", polished), timing=thriftier)
     task = lead.best.attempt.task
     shorter = task.segment / 2
     if shorter >= FINEST and task.horizon / shorter < MOST_SEGMENTS:
@@ -122,7 +131,7 @@ def wandering(
         if any(way.stops) and (not base.pairs() or rng.random() < 0.7):
             way = shifted(base, way, SHIFT * base.horizon, rng)
             run = run if rng.random() < 0.3 else climbed
-        yield Attempt(base, way, "convex", run)
+        yield Attempt(base, way, "convex", run, raised)
         fruitless = fruitless + 1 if lead.best is before else 0
         if fruitless >= FRUITLESS and before is not None and before.result.status == "optimal":
             return
@@ -154,6 +163,17 @@ def polished(
     """More energy steps from given trajectories."""
     steps, x = convex.Steps.of(stage), on_knots(stage, tracks)
     return settled(steps, x, steps.margins(x), progress)
+
+
+def thriftier(
+    stage: Setup, x: Array, margins: Margins, progress: Progress | None
+) -> tuple[Setup, Array, Margins]:
+    """Visits at times that raise r, where it can be, and then at times that save energy at the r reached."""
+    stage, x, margins = raised(stage, x, margins, progress)
+    if margins.share > 1:
+        return stage, x, margins
+    found = retime(stage, x, hold=margins.r - HAIR, weights={2: 1.0}, progress=progress)
+    return found.stage, found.x, found.margins
 
 
 def from_nlp(

@@ -182,7 +182,8 @@ def itineraries(task: Problem, bound: float) -> tuple[list[Itinerary], Infeasibl
 def attempts(task: Problem, ways: list[Itinerary], method: str) -> Iterator[Attempt]:
     """Itineraries and methods in the order in which they are tried."""
     name = "convex" if method == "auto" else method
-    yield from (Attempt(task, way, name, METHODS[name]) for way in ways)
+    timing = raised if name == "convex" else None
+    yield from (Attempt(task, way, name, METHODS[name], timing) for way in ways)
     if method == "auto":
         yield Attempt(task, ways[0], "nlp", groups.last_resort)
 
@@ -194,8 +195,7 @@ def attempt(scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: 
     the plan is too large for the wire.
     """
     tell("build", bound)
-    moving = raised if one.method == "convex" else None
-    flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell, moving)
+    flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell, one.timing)
     one = replace(one, way=flight.way)
     watch.lap("solve")
     watch.move(flight.build_s, "solve", "build")
