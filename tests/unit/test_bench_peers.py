@@ -16,7 +16,8 @@ from tests.bench.table import ROOT
 @pytest.mark.parametrize("name", sorted(own()))
 def test_flat_scenarios_are_legal_and_keep_the_windows(name: str, tmp_path: Path) -> None:
     theirs = flat(name, tmp_path, homeward=False)
-    assert theirs.mission.T == own()[name].steps
+    steps = own()[name].steps
+    assert steps == theirs.mission.T
     ours = flat(name, tmp_path, homeward=True)
     assert ours.mission.T == theirs.mission.T + HOMEWARD
     ends = [c.formula["to"] for c in ours.clauses() if c.formula["op"] in ("eventually", "until")]
