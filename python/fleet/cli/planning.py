@@ -28,6 +28,7 @@ PLAN_KEYS = (
     "memory_mb",
 )  # fmt: skip
 """Keys that `plan --json` adds (design.md, --json)."""
+ENERGY = ("lexicographic", "weighted")
 METHODS = ("auto", "convex", "nlp", "paper", "rrt")
 ScenarioArgument = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (.toml).")]
 
@@ -52,6 +53,16 @@ def plan(
             "paper (log-sum-exp over samples, IPOPT; minutes)."
         ),
     ] = "auto",
+    energy: Annotated[
+        str | None,
+        typer.Option(
+            help="Spend robustness on energy: lexicographic, weighted, or off; as \\[energy] of the scenario "
+            "says if not given."
+        ),
+    ] = None,
+    floor: Annotated[
+        float | None, typer.Option(metavar="M", help="Least robustness that --energy leaves, in metres.")
+    ] = None,
     time_limit: Annotated[
         float | None,
         typer.Option("--time-limit", help="Look for better plans for this long, seconds of planning."),
@@ -69,7 +80,7 @@ def plan(
     """
     interrupt = Interrupt()
     with interrupt.installed(), reply("plan", as_json=as_json, keys=PLAN_KEYS) as answer:
-        loaded = files.read_scenario(scenario)
+        loaded = saving(files.read_scenario(scenario), energy, floor)
         answer.scenario, answer.seed = loaded.name, loaded.mission.seed
         if not as_json:
             show.formula(answer, loaded.clauses())
@@ -81,6 +92,34 @@ def plan(
         answer.exit = exit_of_plan(result.plan)
         if not as_json:
             show.plan(answer, result.plan, answer.fields)
+
+
+def saving(scenario: Scenario, energy: str | None, floor: float | None) -> Scenario:
+    """The scenario with the energy objective that options ask for.
+
+    Raises InputError when an option is not legal.
+    """
+    from dataclasses import replace
+
+    from fleet.scenario.tables import Energy
+
+    if energy not in (None, "off", *ENERGY):
+        legal = ", ".join((*ENERGY, "off"))
+        raise bad_input("value", f"{energy!r} is not legal; must be {legal}", field="--energy")
+    goal = scenario.energy
+    if energy is not None:
+        goal = None if energy == "off" else goal or Energy.model_validate({})
+    if floor is not None and goal is None:
+        raise bad_input("value", "is legal with --energy lexicographic or weighted only", field="--floor")
+    tube = scenario.limits.tube
+    if floor is not None and not tube <= floor <= 1e6:
+        text = f"{floor:g} m is not legal; must be at least the tube, {tube:g} m"
+        raise bad_input("value", text, field="--floor")
+    if goal is None:
+        return replace(scenario, energy=None)
+    chosen: dict[str, object] = {} if energy is None else {"objective": energy}
+    chosen |= {} if floor is None else {"floor": floor}
+    return replace(scenario, energy=goal.model_copy(update=chosen))
 
 
 def make_plan(

@@ -93,12 +93,10 @@ def search(
     try:
         for better in improving(scenario, progress=tell, method=method, further=time_limit is not None):
             found.take(better, time.perf_counter() - begin)
-            if time_limit is None:
-                found.ended = End.FIRST
-                break
-        else:
-            at_bound = found.best is not None and found.best.status is Status.OPTIMAL
-            found.ended = End.BOUND if at_bound else End.EXHAUSTED
+        at_bound = found.best is not None and found.best.status is Status.OPTIMAL
+        found.ended = End.BOUND if at_bound else End.EXHAUSTED
+        if time_limit is None:
+            found.ended = End.FIRST
     except TimeUp as end:
         if found.best is None:
             raise out_of_time(time_limit, end.refusal) from None

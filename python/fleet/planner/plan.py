@@ -38,14 +38,16 @@ def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = 
 
     `method` is "convex" (sequential convex steps), "nlp" (the nonlinear program, IPOPT) or "auto":
     convex, then the nonlinear program where that fails; or a baseline, "rrt" or "paper", whose plan
-    is returned even if it violates the mission. `progress(stage, rho)` is called at every stage. The
-    same scenario gives the same bytes.
+    is returned even if it violates the mission. Where the scenario says so robustness is then spent on
+    energy (saving.py). `progress(stage, rho)` is called at every stage. The same scenario gives the same
+    bytes.
 
     Raises InfeasibleError, naming a clause, when the mission cannot hold or nothing was found that
     keeps the tube's margins; InputError when the plan is too large for the wire; ValueError for an
     unknown method.
     """
-    return next(improving(scenario, progress=progress, method=method, further=False))
+    *_, last = improving(scenario, progress=progress, method=method, further=False)
+    return last
 
 
 def improving(
@@ -53,17 +55,27 @@ def improving(
 ) -> Iterator[PlanResult]:
     """Certified plans, each better than the one before; the first is the one of `plan`.
 
-    With `further` attempts go on where those of `plan` end. Raises as `plan` does, and what
-    `progress` raises.
+    With `further` attempts go on where those of `plan` end. Where the scenario says so the last plan, and
+    then the one of `plan`, is the one that spends robustness on energy, and no others are looked for.
+    Raises as `plan` does, and what `progress` raises.
     """
     if method not in ("auto", *METHODS, *BASELINES):
         raise ValueError(f"method is {method!r}; legal are {', '.join(('auto', *METHODS, *BASELINES))}")
     watch = Watch()
     court = Court(scenario, problem(scenario))
+    tell = progress or (lambda stage, rho: None)
+    goal = None if method in BASELINES else scenario.energy
     try:
-        yield from search(court, progress or (lambda stage, rho: None), method, watch, further=further)
+        for found in search(court, tell, method, watch, further=further and goal is None):
+            yield found
     except InfeasibleError as error:
         raise court.verdict(error) from None
+    if goal is not None:
+        from .saving import frugal  # few scenarios need it, and it needs this module
+
+        thrifty = frugal(scenario, found, goal, tell)
+        if thrifty is not found:
+            yield thrifty
 
 
 def search(court: Court, tell: Progress, method: str, watch: Watch, *, further: bool) -> Iterator[PlanResult]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from fleet.errors import FormulaError
 from fleet.scenario.read import Problems, Tables
-from fleet.scenario.tables import Limits, Mission, Planner, Replan
+from fleet.scenario.tables import Energy, Limits, Mission, Planner, Replan
 from fleet.stl import RESERVED, Vocabulary, default_formula, is_name, parse
 
 MAX_DRONES = 64
@@ -27,6 +27,8 @@ def check(tables: Tables, problems: Problems) -> None:
         _mission(tables.mission, tables.planner, problems)
         if tables.replan is not None:
             _replan(tables.replan, tables.mission, problems)
+    if tables.energy is not None and tables.limits is not None:
+        _energy(tables.energy, tables.limits, problems)
     _disturbances(tables, problems)
     _assignment(tables, problems)
     if _names(tables, problems):
@@ -60,6 +62,13 @@ def _replan(replan: Replan, mission: Mission, problems: Problems) -> None:
     if replan.T_g <= replan.T_e:
         message = f"{replan.T_g:g} s is not legal; must be longer than T_e = {replan.T_e:g} s"
         problems.add("value", "replan.T_g", message)
+
+
+def _energy(energy: Energy, limits: Limits, problems: Problems) -> None:
+    """Robustness below the tube would not hold in flight."""
+    if energy.floor is not None and energy.floor < limits.tube:
+        message = f"{energy.floor:g} m is not legal; must be at least limits.tube = {limits.tube:g} m"
+        problems.add("value", "energy.floor", message)
 
 
 def _divides(period: float, whole: float) -> bool:

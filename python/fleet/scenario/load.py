@@ -74,6 +74,7 @@ def _scenario(name: str, tables: Tables, placed: Placement) -> Scenario:
         limits=tables.limits,
         replan=tables.replan,
         planner=tables.planner,
+        energy=tables.energy,
         obstacles=list(placed.obstacles.values()),
         targets=list(placed.targets.values()),
         drones=list(placed.drones.values()),

@@ -8,7 +8,7 @@ from typing import Any
 
 from fleet.scenario.polyhedron import Array
 from fleet.scenario.region import Region
-from fleet.scenario.tables import Disturbance, Limits, Mission, Planner, Replan, Wind
+from fleet.scenario.tables import Disturbance, Energy, Limits, Mission, Planner, Replan, Wind
 from fleet.stl import Clause, Vocabulary, default_formula, parse
 
 
@@ -56,6 +56,7 @@ class Scenario:
     limits: Limits
     replan: Replan
     planner: Planner
+    energy: Energy | None
     obstacles: list[Region]
     targets: list[Target]
     drones: list[Drone]

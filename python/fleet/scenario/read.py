@@ -15,7 +15,7 @@ from fleet.scenario import tables
 
 T = TypeVar("T", bound=BaseModel)
 
-SINGLE = ("mission", "workspace", "limits", "replan", "planner", "wind", "assignment")
+SINGLE = ("mission", "workspace", "limits", "replan", "planner", "energy", "wind", "assignment")
 REPEATED = ("obstacle", "target", "drone", "disturbance")
 
 
@@ -50,6 +50,7 @@ class Tables:
         self.limits = self._one("limits", tables.Limits)
         self.replan = self._one("replan", tables.Replan)
         self.planner = self._one("planner", tables.Planner)
+        self.energy = self._one("energy", tables.Energy) if "energy" in document else None
         self.wind = self._one("wind", tables.Wind)
         self.obstacles = self._many("obstacle", tables.Obstacle)
         self.targets = self._many("target", tables.TargetTable)

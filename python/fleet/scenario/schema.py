@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field
 from fleet.scenario.tables import (
     Disturbance,
     DroneTable,
+    Energy,
     Limits,
     Mission,
     Obstacle,
@@ -35,6 +36,7 @@ class Document(Table):
     limits: Limits = Field(default_factory=Limits)
     replan: Replan = Field(default_factory=Replan)
     planner: Planner = Field(default_factory=lambda: Planner.model_validate({}))
+    energy: Energy | None = None
     wind: Wind = Field(default_factory=Wind)
     obstacle: list[Obstacle] = Field(default_factory=list)
     target: list[TargetTable] = Field(default_factory=list)

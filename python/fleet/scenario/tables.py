@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -63,6 +63,20 @@ class Planner(Table):
     segment: float = Field(1.0, ge=0.05, le=10)
     max_iterations: int = Field(2000, ge=1, le=100_000)
     tolerance: float = Field(1e-4, gt=0, le=0.1)
+
+
+class Energy(Table):
+    """`[energy]`: robustness is spent on flying with less energy (paper, section III-E).
+
+    `lexicographic`: maximise rho, then make the integral of |a|^2 small at rho >= `floor` [m], or where none
+    is given at `give_up` [m] less than the largest. `weighted`: maximise rho - eps' Q eps, with eps above the
+    squared acceleration of every sample and axis and Q = `weight` [s^8/m^3] times the identity.
+    """
+
+    objective: Literal["lexicographic", "weighted"] = "lexicographic"
+    floor: Positive | None = None
+    give_up: float = Field(0.05, ge=0, le=1e6)
+    weight: Positive = 3000.0
 
 
 class Prism(Table):
