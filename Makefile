@@ -54,7 +54,7 @@ lock: setup ## Resolve requirements.lock anew from pyproject.toml
 
 bench: bench-plan bench-replan bench-tick bench-sim ## Run every benchmark; tables and target/bench/*.json
 
-bench-plan: setup ## Planning time and robustness of the shipped scenarios
+bench-plan: setup ## Planning time and robustness: ours, the paper's formulation, RRT*; lines of towers (10 minutes)
 	$(BIN)/python -m tests.bench.plan
 
 bench-replan: ## Local replan over random instances

@@ -37,6 +37,8 @@ def measure(scenario: Path, method: str, folder: Path) -> dict[str, Any]:
     if runs[-1].code not in ((0,) if method == "ours" else (0, 1, 3)):
         raise SystemExit(f"{scenario.stem} by {method}: exit {runs[-1].code}: {last['errors']}")
     found = last["status"] is not None
+    for note in last["notes"] or ():
+        print(f"{scenario.stem} by {method}: {note}")
     return {
         "case": scenario.stem,
         "method": method,

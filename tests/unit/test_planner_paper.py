@@ -12,6 +12,7 @@ import pytest
 from fleet import _core
 from fleet.certificate import verify
 from fleet.cli.planning import exit_of_plan, plan_fields
+from fleet.errors import InputError
 from fleet.planner import PlanResult, Status, plan
 from fleet.planner.algebra import Numbers, Score
 from fleet.planner.lifted import Lifted
@@ -168,3 +169,11 @@ def test_fewer_knots_than_must_stay_are_refused() -> None:
     samples = np.zeros((101, 9))
     with pytest.raises(ValueError, match="knots"):
         thinned(samples, 0.05, set(range(0, 101, 2)), 20, 1.0)
+
+
+def test_a_mission_too_large_for_memory_is_refused_before_any_solve(tmp_path: Path) -> None:
+    """Nested windows multiply: 81 x 81 x 81 x 6 values, more than 3 million."""
+    text = "@often always[0,4] (eventually[0,4] (always[0,4] (d1 in workspace)))"
+    with pytest.raises(InputError, match="plan fewer drones, or with a longer T_s") as caught:
+        plan(hover(tmp_path, text), method="paper")
+    assert caught.value.problems[0].code == "size"

@@ -23,15 +23,15 @@ Progress = Callable[[str, float], None]
 class Flown:
     """Trajectories of all drones, the itinerary at the times that they keep, integral of |a|^2 [m^2/s^3].
 
-    `build_s` time to build a program [s], `aside_s` time of attempts that were not kept, which do not count
-    as planning [s]; `notes` in words what people should know.
+    `build_s` time to build a program [s]; `aside_s` time of attempts that were not kept, which do not count
+    as planning, where there are any [s]; `notes` in words what people should know.
     """
 
     tracks: list[_core.Trajectory]
     way: Itinerary
     int_a2: float
     build_s: float = 0.0
-    aside_s: float = 0.0
+    aside_s: float | None = None
     notes: tuple[str, ...] = ()
 
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fleet.errors import InfeasibleError
+from fleet.errors import InfeasibleError, InputError
+from fleet.errors import Problem as Fault
 from fleet.stl.vocabulary import Formula
 
 from .knots import KNOT, Array, Grid
@@ -24,6 +25,7 @@ from .samples import Hessian, Optimum, maximise
 from .schedule import Itinerary, Stop
 from .setup import MOST_SEGMENTS, setup, warm_start
 from .signals import Signals
+from .smooth import leaves
 from .spec import negation_normal
 from .thinning import thinned
 
@@ -31,6 +33,8 @@ Tell = Callable[[str, float], None]
 
 #: Largest residual of the dynamics of a result that counts [m, m/s]: IPOPT's own tolerance of constraints.
 RESIDUAL = 1e-4
+#: Most predicate values of a mission: 1 GB of memory at 0.5 GB a million, measured on `multi_line`.
+LARGEST = 2_000_000
 #: Difference of exact robustness that decides between two results [m]; below it, iterations do.
 SAME = 1e-3
 
@@ -56,8 +60,9 @@ def fly(
 ) -> tuple[Grid, Array, Itinerary, Found, list[Found]]:
     """Knots of all drones, the itinerary at the times kept, the solve that made them, and the others.
 
-    Raises InfeasibleError when neither solve ends with trajectories.
+    Raises InfeasibleError when neither solve ends with trajectories, InputError for too large a mission.
     """
+    refuse_size(task, formulas)
     mission = settled({"op": "and", "fs": [negation_normal(f) for f in formulas]}, visited(task, way))
     warm = sampled(task, way)
     found = [solve(task, mission, formulas, warm, hessian, tell) for hessian in Hessian]
@@ -69,6 +74,15 @@ def fly(
     made = retimed(task, way, kept.optimum.samples)
     grid, x = knots(task, made, kept.optimum.samples)
     return grid, x, made, kept, others
+
+
+def refuse_size(task: Problem, formulas: list[Formula]) -> None:
+    """Raises InputError for a mission whose program would take more memory than a laptop has."""
+    count = sum(leaves(f, task.regions, task.sample) for f in formulas)
+    if count > LARGEST:
+        text = f"paper poses every sample: {count} predicate values, at most {LARGEST} are legal"
+        text = f"{text}; plan fewer drones, or with a longer T_s"
+        raise InputError(text, problems=[Fault("size", "", "--method", text)])
 
 
 def solve(

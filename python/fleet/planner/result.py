@@ -44,7 +44,8 @@ class PlanResult:
     `rho_bound` [m]; `timings` [s] of process, route, build, solve, certify; `int_a2` the integral of
     |a|^2 over the fleet [m^2/s^3]; `energies` electrical energy of every drone, and of hovering for as
     long [J] (crates/core, power); `assignment` targets of every drone in order; `events` one entry
-    {drone, region, t, window, slack_s} a visit; `notes` of a baseline, in words.
+    {drone, region, t, window, slack_s} a visit; `notes` of a baseline, in words, whose
+    `timings` may have `aside`, of attempts that do not count.
     """
 
     plan: dict[str, Any]

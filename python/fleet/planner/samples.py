@@ -42,8 +42,8 @@ SPARED = 0.999
 class Hessian(StrEnum):
     """Second derivatives that IPOPT is given, in words for people."""
 
-    EXACT = "exact"
     QUASI_NEWTON = "quasi-Newton"
+    EXACT = "exact"
 
 
 #: Options of IPOPT of each; what is not said is its default. Weights near 0 must not be pushed away from it.
