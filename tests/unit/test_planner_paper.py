@@ -23,6 +23,58 @@ from fleet.scenario import Scenario, load
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 C = 5.0
+SWAP = """
+[mission]
+T = 12.0
+T_s = 0.1
+c = 5.0
+seed = 1
+
+[limits]
+v_max = 3.0
+a_max = 3.0
+delta_min = 1.5
+tube = 0.2
+
+[replan]
+T_e = 0.1
+T_g = 5.0
+eta = 0.2
+enabled = true
+
+[workspace]
+box = [[-6.0, -4.0, 0.0], [6.0, 4.0, 6.0]]
+
+[[obstacle]]
+name = "post"
+box = [[-0.5, -4.0, 0.0], [0.5, 0.0, 6.0]]
+
+[[target]]
+name = "east"
+box = [[3.0, -1.0, 2.0], [5.0, 1.0, 4.0]]
+heading = 0.0
+
+[[target]]
+name = "west"
+box = [[-5.0, -1.0, 2.0], [-3.0, 1.0, 4.0]]
+heading = 0.0
+
+[[drone]]
+id = "d1"
+home = { box = [[-5.0, -1.0, 0.5], [-3.0, 1.0, 2.5]] }
+pad = [-4.0, 0.0, 0.1]
+heading = 0.0
+
+[[drone]]
+id = "d2"
+home = { box = [[3.0, -1.0, 0.5], [5.0, 1.0, 2.5]] }
+pad = [4.0, 0.0, 0.1]
+heading = 0.0
+
+[assignment]
+d1 = ["east"]
+d2 = ["west"]
+"""
 
 
 def hover(folder: Path, formula: str) -> Scenario:
@@ -101,6 +153,21 @@ def test_until_is_planned_too(tmp_path: Path) -> None:
     result = plan(hover(tmp_path, "@order d1.x <= 0.5 until[4,6] d1 in up"), method="paper")
     assert result.status is Status.CERTIFIED
     assert verify(result.data).ok
+
+
+def test_drones_and_axes_are_planned_together(tmp_path: Path) -> None:
+    """Two drones change sides beside a post; pair distance and clearance by an own oracle at 100 Hz."""
+    (tmp_path / "swap.toml").write_text(SWAP)
+    result = plan(load(tmp_path / "swap.toml"), method="paper")
+    assert result.status is Status.CERTIFIED
+    assert verify(result.data).ok
+    times = np.arange(0, 12.0 + 1e-9, 0.01)
+    tracks = [_core.Trajectory.from_list(d["trajectory"]) for d in result.plan["drones"]]
+    one, two = (track.sample(times)[:, :3] for track in tracks)
+    assert np.linalg.norm(one - two, axis=1).min() >= 1.5 + result.rho_lower
+    for p in (one, two):
+        beside = np.max([np.abs(p[:, 0]) - 0.5, np.abs(p[:, 1] + 2.0) - 2.0, p[:, 2] - 6.0], axis=0)
+        assert beside.min() >= result.rho_lower - 1e-6
 
 
 def test_choices_of_a_drone_are_settled_and_others_stay() -> None:
