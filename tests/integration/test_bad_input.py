@@ -169,6 +169,25 @@ def test_infeasible_names_the_clause(fleet: Fleet, tmp_path: Path) -> None:
     assert answer.json["conflict"]["proved"] is True
 
 
+def test_what_gave_way_is_told_and_not_flown(fleet: Fleet, tmp_path: Path) -> None:
+    """Two metres up within half a second: the visit is late, and no drone would accept that plan."""
+    path = tmp_path / "mission.toml"
+    formula = 'seed = 1\nformula = "@up eventually[0,0.5] d1 in up"'
+    path.write_text(HOVER.replace("seed = 1", formula))
+    found = fleet("plan", str(path), "--json", "--relax", "-o", "late.plan.cbor")
+    found.assert_no_traceback()
+    assert (found.code, found.json["status"]) == (1, "violated")
+    (gave,) = found.json["relaxed"]
+    assert (gave["clause"], gave["how"]) == ("up", "late")
+    assert gave["by_s"] == pytest.approx(found.json["events"][0]["t"] - 0.5)
+    shown = fleet("plan", str(path), "--relax")
+    assert f"gave way: up: reached at {found.json['events'][0]['t']:.1f} s" in shown.out
+    flown = fleet("simulate", "late.plan.cbor", "--json")
+    assert flown.code == 1
+    assert [problem["code"] for problem in flown.json["errors"]] == ["violated"]
+    assert "no drone accepts" in flown.err
+
+
 def test_a_port_that_is_taken(fleet: Fleet, endpoint: str, tmp_path: Path) -> None:
     port = int(endpoint.rpartition(":")[2])
     with socket.create_server(("127.0.0.1", port)):

@@ -29,6 +29,7 @@ DRONE = {"id", "rmse_m", "max_m", "replans", "end", "energy_J", "min_clearance_m
 PLAN = [
     *("plan", "hash", "status", "method", "rho", "rho_lower", "rho_bound", "clauses", "assignment"),
     *("events", "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict"),
+    *("relaxed", "notes", "history", "ended", "memory_mb"),
 ]
 Fleet = Callable[..., Answer]
 

@@ -13,7 +13,7 @@ from fleet.cli.planning import make_plan
 from fleet.cli.progress import bar, spinner
 from fleet.cli.reply import Json, Reply, reply
 from fleet.endpoint import DEFAULT_ENDPOINT, parse_endpoint
-from fleet.errors import Exit
+from fleet.errors import Exit, Problem, ViolatedError
 from fleet.faults import bad_input, environment
 from fleet.interrupt import Interrupt
 
@@ -212,7 +212,22 @@ def _mission(answer: Reply, path: Path) -> tuple[files.PlanFile, str]:
         raise bad_input("plan", "is a flight log; legal is a scenario or a plan", file=str(path))
     plan = files.read_plan(path)
     answer.scenario, answer.seed = plan.plan["scenario"], plan.plan["seed"]
+    _refuse_violating(plan, path)
     return plan, world_of_plan(plan.plan)
+
+
+def _refuse_violating(plan: files.PlanFile, path: Path) -> None:
+    """No drone accepts a plan that violates its mission (crates/core admission): say so before any is asked.
+
+    Raises ViolatedError.
+    """
+    if plan.plan["status"] != "violated":
+        return
+    broken = [c["id"] for c in plan.plan["clauses"] if c["result"]["rho_lower"] <= 0]
+    which = f" (clause {', '.join(broken)})" if broken else ""
+    text = f"the plan violates its mission{which}, and no drone accepts such a plan; to fly it, "
+    text += "write what gave way into the scenario's formula and plan that mission"
+    raise ViolatedError(f"{path}: {text}", problems=[Problem("violated", str(path), "", text)])
 
 
 def _conclude(answer: Reply, plan: files.PlanFile, finished: Any, *, aborted: bool) -> None:

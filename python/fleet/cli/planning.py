@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 PLAN_KEYS = (
     "plan", "hash", "status", "method", "rho", "rho_lower", "rho_bound", "clauses", "assignment", "events",
-    "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict", "notes", "history", "ended",
-    "memory_mb",
+    "time_s", "int_a2", "energy_J", "hover_share", "drones", "conflict", "relaxed", "notes", "history",
+    "ended", "memory_mb",
 )  # fmt: skip
 """Keys that `plan --json` adds (design.md, --json)."""
 ENERGY = ("lexicographic", "weighted")
@@ -67,6 +67,13 @@ def plan(
         float | None,
         typer.Option("--time-limit", help="Look for better plans for this long, seconds of planning."),
     ] = None,
+    relax: Annotated[
+        bool,
+        typer.Option(
+            "--relax",
+            help="If the mission cannot hold, plan the least violation: visits late, else skipped; exit 1.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Plan a mission and prove that the plan satisfies it.
@@ -84,14 +91,17 @@ def plan(
         answer.scenario, answer.seed = loaded.name, loaded.mission.seed
         if not as_json:
             show.formula(answer, loaded.clauses())
-        result = make_plan(answer, loaded, method, interrupt, time_limit)
+        result = make_plan(answer, loaded, method, interrupt, time_limit, relax=relax)
         answer.fields |= plan_fields(result)
+        answer.fields["relaxed"] = [gave.as_dict() for gave in result.relaxed] if relax else None
         if output is not None:
             files.write_atomic(output, result.bytes)
             answer.fields["plan"] = str(output)
         answer.exit = exit_of_plan(result.plan)
         if not as_json:
             show.plan(answer, result.plan, answer.fields)
+            for gave in result.relaxed:
+                answer.say(f"gave way: {gave}")
 
 
 def saving(scenario: Scenario, energy: str | None, floor: float | None) -> Scenario:
@@ -128,6 +138,8 @@ def make_plan(
     method: str = "auto",
     interrupt: Interrupt | None = None,
     time_limit: float | None = None,
+    *,
+    relax: bool = False,
 ) -> PlanResult:
     """Plan with progress on stderr; an infeasible mission leaves why in `conflict`.
 
@@ -141,11 +153,12 @@ def make_plan(
         )
     try:
         if interrupt is not None:
-            return keep_best(answer, interrupt, scenario, method, time_limit)
+            return keep_best(answer, interrupt, scenario, method, time_limit, relax=relax)
         with spinner(answer.err, f"planning {scenario.name}") as tell:
             return planner.plan(
                 scenario,
                 method=method,
+                relax=relax,
                 progress=lambda stage, rho: tell(stage if isnan(rho) else f"{stage}, rho {rho:.2f} m"),
             )
     except InfeasibleError as error:

@@ -40,7 +40,13 @@ _ENDED = {
 
 
 def keep_best(
-    answer: Reply, interrupt: Interrupt, scenario: Scenario, method: str, time_limit: float | None
+    answer: Reply,
+    interrupt: Interrupt,
+    scenario: Scenario,
+    method: str,
+    time_limit: float | None,
+    *,
+    relax: bool = False,
 ) -> PlanResult:
     """The first certified plan, or the best one by the time limit; a signal keeps the best so far.
 
@@ -58,7 +64,7 @@ def keep_best(
     found = anytime.Found()
     try:
         with shown(answer.err, f"planning {scenario.name}", found) as tell:
-            anytime.search(scenario, found, time_limit=time_limit, method=method, progress=tell)
+            anytime.search(scenario, found, time_limit=time_limit, method=method, progress=tell, relax=relax)
             interrupt.count_only()
     except KeyboardInterrupt:
         if found.best is None:

@@ -74,11 +74,13 @@ def search(
     time_limit: float | None = None,
     method: str = "auto",
     progress: Progress | None = None,
+    relax: bool = False,
 ) -> None:
     """Put the first certified plan into `found`, and with a `time_limit` [s] better ones until it has passed.
 
     Without a time limit this is `plan`. With one it ends earlier when the robustness is at its bound and
-    nothing saves energy any more; what has been found depends on how fast the machine is.
+    nothing saves energy any more; what has been found depends on how fast the machine is. With `relax` a
+    mission that cannot hold has the plan of least violation.
 
     Raises TimeLimitError when no plan was found in time, and else as `plan` does.
     """
@@ -91,7 +93,8 @@ def search(
             progress(stage, rho)
 
     try:
-        for better in improving(scenario, progress=tell, method=method, further=time_limit is not None):
+        further = time_limit is not None
+        for better in improving(scenario, progress=tell, method=method, further=further, relax=relax):
             found.take(better, time.perf_counter() - begin)
         at_bound = found.best is not None and found.best.status is Status.OPTIMAL
         found.ended = End.BOUND if at_bound else End.EXHAUSTED

@@ -18,6 +18,7 @@ from fleet.errors import Conflict, InfeasibleError, Need
 
 from .necessary import Geometry, Impossible, impossible_margins
 from .problem import Problem
+from .progress import Progress, TimeUp, silent
 from .reach import least_times, misfits, needs
 from .spec import negation_normal
 from .subset import irreducible, subset
@@ -33,12 +34,17 @@ class Court:
 
     scenario: Scenario
     task: Problem
+    tell: Progress = silent
 
     def verdict(self, error: InfeasibleError) -> InfeasibleError:
         """The error with a conflict: as it is if it has one, else proved, else searched for."""
         if error.conflict is not None:
             return error
-        return self.proof or self.search(error)
+        try:
+            return self.proof or self.search(error)
+        except TimeUp as end:
+            end.refusal = error
+            raise
 
     def refuse_proved(self) -> None:
         """Raises InfeasibleError if a conflict is proved; asked again, it costs nothing."""
@@ -81,12 +87,12 @@ class Court:
 
     def freed(self, clauses: tuple[str, ...]) -> bool:
         """Whether a plan is found without any one of the clauses, within the trials' bounds."""
-        trials = Trials(self.task)
+        trials = Trials(self.task, tell=self.tell)
         return all(trials.plans(tuple(c for c in clauses if c != left_out)) for left_out in clauses)
 
     def search(self, error: InfeasibleError) -> InfeasibleError:
         """The error that names a least set of clauses for which no plan was found."""
-        trials = Trials(self.task)
+        trials = Trials(self.task, tell=self.tell)
         clauses = tuple(self.task.spec.kinds)
         if trials.plans(clauses):
             # The bounded trial kept all margins, and yet no plan was certified: those words are best.

@@ -15,7 +15,8 @@ from .ceiling import rho_bound, slack_bound
 from .conflict import Court
 from .improve import Attempt, Certified, Lead, improvements
 from .problem import Problem, problem
-from .progress import Progress, TimeUp
+from .progress import Progress, TimeUp, silent
+from .relax import relaxed
 from .result import PlanResult, result
 from .schedule import Itinerary, schedules
 from .sketch import sketched
@@ -33,43 +34,56 @@ WIDEST = 5.0
 WORTH = 1e-3
 
 
-def plan(scenario: Scenario, *, progress: Progress | None = None, method: str = "auto") -> PlanResult:
+def plan(
+    scenario: Scenario, *, progress: Progress | None = None, method: str = "auto", relax: bool = False
+) -> PlanResult:
     """Plan a scenario: assign, route, optimise, certify; the first plan that satisfies it.
 
     `method` is "convex" (sequential convex steps), "nlp" (the nonlinear program, IPOPT) or "auto":
     convex, then the nonlinear program where that fails; or a baseline, "rrt" or "paper", whose plan
     is returned even if it violates the mission. Where the scenario says so robustness is then spent on
-    energy (saving.py). `progress(stage, rho)` is called at every stage. The same scenario gives the same
-    bytes.
+    energy (saving.py). With `relax` a mission that cannot hold gets the plan of least violation
+    (relax.py), which says what gave way. `progress(stage, rho)` is called at every stage. The same
+    scenario gives the same bytes.
 
     Raises InfeasibleError, naming a clause, when the mission cannot hold or nothing was found that
     keeps the tube's margins; InputError when the plan is too large for the wire; ValueError for an
     unknown method.
     """
-    *_, last = improving(scenario, progress=progress, method=method, further=False)
+    *_, last = improving(scenario, progress=progress, method=method, further=False, relax=relax)
     return last
 
 
 def improving(
-    scenario: Scenario, *, progress: Progress | None = None, method: str = "auto", further: bool = True
+    scenario: Scenario,
+    *,
+    progress: Progress | None = None,
+    method: str = "auto",
+    further: bool = True,
+    relax: bool = False,
 ) -> Iterator[PlanResult]:
     """Certified plans, each better than the one before; the first is the one of `plan`.
 
     With `further` attempts go on where those of `plan` end. Where the scenario says so the last plan, and
     then the one of `plan`, is the one that spends robustness on energy, and no others are looked for.
-    Raises as `plan` does, and what `progress` raises.
+    With `relax` a mission that cannot hold has one plan, of least violation. Raises as `plan` does, and
+    what `progress` raises.
     """
     if method not in ("auto", *METHODS, *BASELINES):
         raise ValueError(f"method is {method!r}; legal are {', '.join(('auto', *METHODS, *BASELINES))}")
     watch = Watch()
-    court = Court(scenario, problem(scenario))
-    tell = progress or (lambda stage, rho: None)
+    tell = progress or silent
+    court = Court(scenario, problem(scenario), tell)
     goal = None if method in BASELINES else scenario.energy
     try:
         for found in search(court, tell, method, watch, further=further and goal is None):
             yield found
     except InfeasibleError as error:
-        raise court.verdict(error) from None
+        refusal = court.verdict(error)
+        if not relax:
+            raise refusal from None
+        yield relaxed(court, refusal, lambda part: next(search(part, tell, method, watch, further=False)))
+        return
     if goal is not None:
         from .saving import frugal  # few scenarios need it, and it needs this module
 
@@ -226,7 +240,7 @@ def attempt(scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: 
         timings=watch.spent,
     )
     watch.lap("certify")
-    refuse_broken(out)
+    refuse_broken(out, one.task.excused)
     return Certified(replace(out, timings=dict(watch.spent)), one, flight.tracks)
 
 
@@ -242,12 +256,15 @@ def refuse(task: Problem, margins: convex.Margins) -> None:
         raise InfeasibleError(text, clause=margins.short)
 
 
-def refuse_broken(found: PlanResult) -> None:
-    """Raises InfeasibleError when a plan keeps limits and margins but a clause of it is not proved.
+def refuse_broken(found: PlanResult, excused: frozenset[str] = frozenset()) -> None:
+    """Raises InfeasibleError when a plan keeps limits and margins but a clause not `excused` is not proved.
 
     The margins of clauses without a normal form are those of chosen witnesses; the certificate decides.
     """
-    worst = min(found.plan["clauses"], key=lambda clause: clause["result"]["rho_lower"])
+    clauses = [clause for clause in found.plan["clauses"] if clause["id"] not in excused]
+    if not clauses:
+        return
+    worst = min(clauses, key=lambda clause: clause["result"]["rho_lower"])
     rho = float(worst["result"]["rho_lower"])
     if rho <= 0:
         text = f"the best robustness found is {rho:.2f} m, and the mission asks for more than 0"

@@ -27,7 +27,7 @@ class Problem:
     `headings` required heading per target [rad],
     `segment` longest segment [s], `c` sharpness of smooth robustness [1/m], `max_iterations` and
     `tolerance` those of the nonlinear program, `given` hand-made orders of targets, or None, `weights` of
-    clauses by id, the heaviest 1 (weights.py).
+    clauses by id, the heaviest 1 (weights.py), `excused` clauses that a plan may violate (relax.py).
     """
 
     ids: tuple[str, ...]
@@ -53,6 +53,7 @@ class Problem:
     tolerance: float
     given: Mapping[str, tuple[str, ...]] | None
     weights: Mapping[str, float]
+    excused: frozenset[str] = frozenset()
 
     def number(self, drone: str) -> int:
         """Index of a drone."""

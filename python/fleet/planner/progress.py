@@ -10,6 +10,10 @@ from fleet.errors import InfeasibleError
 Progress = Callable[[str, float], None]
 
 
+def silent(_stage: str, _rho: float) -> None:
+    """Progress that nobody listens to."""
+
+
 class TimeUp(Exception):
     """Raised by a `Progress` once the time limit has passed; `refusal` is why nothing was found so far."""
 

@@ -23,6 +23,8 @@ from .schedule import Itinerary
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
 
+    from .relax import GaveWay
+
 
 class Status(StrEnum):
     """How planning ended; the values of `PlanStatus` in crates/core."""
@@ -62,6 +64,7 @@ class PlanResult:
     events: list[dict[str, Any]]
     energies: dict[str, tuple[float, float]]
     notes: tuple[str, ...] = ()
+    relaxed: tuple[GaveWay, ...] = ()
 
     @property
     def energy(self) -> float:

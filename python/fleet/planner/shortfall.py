@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from .groups import Flight
+from fleet import _core
+
+from .convex import Margins
 from .knots import Array
 from .problem import Problem
 from .schedule import Itinerary
@@ -17,15 +19,13 @@ from .spec import Invariant
 TOLD = 3
 
 
-def shortfalls(task: Problem, way: Itinerary, flight: Flight) -> str:
+def shortfalls(task: Problem, way: Itinerary, tracks: Sequence[_core.Trajectory], margins: Margins) -> str:
     """The largest shortfalls of trajectories against limits and the tube, in words."""
-    if flight.margins.share > 1:
+    if margins.share > 1:
         limits = f"v_max = {task.v_max:g} m/s and a_max = {task.a_max:g} m/s^2"
-        return (
-            f"{limits} cannot be kept: the best found passes one by {100 * (flight.margins.share - 1):.1f} %"
-        )
+        return f"{limits} cannot be kept: the best found passes one by {100 * (margins.share - 1):.1f} %"
     times = np.arange(round(task.horizon / task.sample) + 1).astype(np.float64) * task.sample
-    positions = np.stack([np.asarray(t.sample(times))[:, :3] for t in flight.tracks])
+    positions = np.stack([np.asarray(t.sample(times))[:, :3] for t in tracks])
     found = [
         *invariant_margins(task, times, positions),
         *visit_margins(task, way, times, positions),
@@ -35,7 +35,7 @@ def shortfalls(task: Problem, way: Itinerary, flight: Flight) -> str:
     words = [text for spare, _, text in short[:TOLD] if spare < 0]
     if words:
         return "; ".join(words)
-    best = flight.margins.tube + task.tube
+    best = margins.tube + task.tube
     return f"the best margin found is {best:.2f} m, and the tube asks for {task.tube:.2f} m"
 
 
@@ -48,7 +48,7 @@ def invariant_margins(task: Problem, times: Array, positions: Array) -> Iterator
             continue
         told.add((inv.kind, drones, inv.region))
         inside = (times >= inv.window[0] - 1e-9) & (times <= inv.window[1] + 1e-9)
-        value = margins(task, inv, positions[:, inside])
+        value = margin_of(task, inv, positions[:, inside])
         if not len(value):
             continue
         k = int(value.argmin())
@@ -64,7 +64,7 @@ def rest_margins(task: Problem, positions: Array) -> Iterator[tuple[float, float
         yield rho, task.tube, f"@{part.clause} holds with a margin of {rho:.2f} m only"
 
 
-def margins(task: Problem, inv: Invariant, positions: Array) -> Array:
+def margin_of(task: Problem, inv: Invariant, positions: Array) -> Array:
     """Margin (m,) [m] of an invariant at positions (d, m, 3)."""
     p = positions[task.number(inv.drones[0])]
     if inv.kind == "apart":

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from fleet.assign import EXACT
 from fleet.errors import InfeasibleError, Need
 
@@ -12,17 +14,22 @@ from . import convex, groups
 from .ceiling import rho_bound
 from .knots import Array
 from .problem import Problem
+from .progress import Progress, silent
 from .reach import Reach, needs
+from .result import trajectory
 from .schedule import Itinerary, leg_times, schedules, survey
 from .setup import Setup, warm_start
 from .shortfall import shortfalls
 from .sketch import sketched
+from .spec import Invariant
 from .subset import subset
 
 #: Margin above the tube at which a trial is content [m].
 CONTENT = 0.02
-#: Unknowns times convex steps that all trials of one search may take; about 5 s on a 2020s processor.
-BUDGET = 4_000_000
+#: Unknowns times convex steps that all trials of one search may take; 5 to 10 s on a processor of 2020.
+BUDGET = 150_000
+#: What routing costs a trial, in the same measure.
+ROUTING = 1_000
 #: Clearance at which routes are sought when nothing bounds it [m].
 WIDEST = 5.0
 #: Places that are surveyed as a whole for the words of a refusal.
@@ -33,14 +40,47 @@ class ExhaustedError(Exception):
     """The trials have taken all the steps that they may."""
 
 
+class ShortError(Exception):
+    """Trajectories of a part of the fleet that do not keep limits or the tube's margins."""
+
+    def __init__(self, stage: Setup, x: Array, margins: convex.Margins) -> None:
+        super().__init__(f"margin {margins.tube:.3f} m over the tube")
+        self.stage, self.x, self.margins = stage, x, margins
+
+    def why(self) -> str:
+        """What falls short, in words."""
+        task, way, grid = self.stage.problem, self.stage.itinerary, self.stage.grid
+        tracks = [trajectory(task, way, grid, self.x, d) for d in range(len(task.ids))]
+        return shortfalls(task, way, tracks, self.margins)
+
+    def clauses(self) -> frozenset[str]:
+        """The clauses whose visits the drones of this part make."""
+        return frozenset(s.visit.clause for stops in self.stage.itinerary.stops for s in stops)
+
+
+def kept(margins: convex.Margins) -> bool:
+    """Whether limits and the tube's margins are kept."""
+    return margins.share <= 1 and margins.tube >= -1e-6
+
+
+def covers(inv: Invariant, horizon: float) -> bool:
+    """Whether an invariant holds over the whole mission."""
+    return inv.window[0] <= 0 and inv.window[1] >= horizon - 1e-9
+
+
 @dataclass
 class Trials:
-    """Trials of parts of one mission within a common budget; answers are kept."""
+    """Trials of parts of one mission within a common budget; answers are kept.
+
+    `failing` has the clauses whose visits are made by the drones that fell short last.
+    """
 
     task: Problem
     left: int = BUDGET
+    tell: Progress = silent
     exhausted: bool = False
     known: dict[tuple[str, ...], str | None] = field(default_factory=dict)
+    failing: frozenset[str] = frozenset()
 
     def plans(self, clauses: tuple[str, ...]) -> bool:
         """Whether a plan was found for these clauses; taken for granted once the budget is spent."""
@@ -55,6 +95,14 @@ class Trials:
                 return True
         return self.known[key] is None
 
+    def succeeds(self, task: Problem) -> bool:
+        """Whether a plan was found for a problem; not once the budget is spent."""
+        try:
+            return not self.exhausted and self.attempt(task) is None
+        except ExhaustedError:
+            self.exhausted = True
+            return False
+
     def why(self, clauses: tuple[str, ...]) -> str | None:
         """Why no plan was found for these clauses; None if one was, or they were not tried."""
         return self.known.get(clauses)
@@ -62,21 +110,31 @@ class Trials:
     def attempt(self, task: Problem) -> str | None:
         """Plan a part, weights aside: None when that worked, else why it did not."""
         task = replace(task, weights={})
+        self.left -= ROUTING
+        self.tell("explain", np.nan)
         try:
             bound = min(rho_bound(task), WIDEST)
             ways = routed(task, bound)
         except InfeasibleError as error:
             return error.problems[0].message
+        if not task.spec.rest and all(covers(inv, task.horizon) for inv in task.spec.invariants):
+            ways = ways[:1]  # early and late visits only help past what holds for a part of the mission
         why = None
         for way in ways:
-            flight = groups.fly(task, way, min(bound, task.tube + CONTENT), self.enough)
-            if flight.margins.share <= 1 and flight.margins.tube >= -1e-6:
+            try:
+                groups.fly(task, way, min(bound, task.tube + CONTENT), self.enough)
+            except ShortError as short:
+                why = why or short.why()
+                self.failing = short.clauses()
+            else:
                 return None
-            why = why or shortfalls(task, way, flight)
         return why
 
     def enough(self, stage: Setup, progress: groups.Progress | None) -> tuple[Array, convex.Margins]:
-        """Convex steps until limits and the tube's margins are kept."""
+        """Convex steps until limits and the tube's margins are kept.
+
+        Raises ShortError when they are not: the other parts of the fleet need not be looked at.
+        """
         best: tuple[Array, convex.Margins, convex.Steps] | None = None
         start = warm_start(stage)
         for lift in convex.LIFTS:
@@ -87,9 +145,11 @@ class Trials:
             self.left -= count * stage.grid.size
             if best is None or convex.better(margins, best[1]):
                 best = (x, margins, steps)
-            if (best[1].share <= 1 and best[1].tube >= -1e-6) or not convex.blames_pair(best):
+            if kept(best[1]) or not convex.blames_pair(best):
                 break
         assert best is not None, "there is always a first lift"
+        if not kept(best[1]):
+            raise ShortError(stage, best[0], best[1])
         return best[:2]
 
     def times(self, task: Problem) -> Iterator[Need]:
