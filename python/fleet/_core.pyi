@@ -103,12 +103,12 @@ class _Implies(TypedDict):
 # `from` is a keyword, so that these need the functional form.
 _Window = TypedDict(
     "_Window",
-    {"op": Literal["always", "eventually"], "from": float, "to": float, "f": "_Formula"},
+    {"op": Literal["always", "eventually", "once", "historically"], "from": float, "to": float, "f": "_Formula"},
 )
 
 _Until = TypedDict(
     "_Until",
-    {"op": Literal["until"], "from": float, "to": float, "left": "_Formula", "right": "_Formula"},
+    {"op": Literal["until", "since"], "from": float, "to": float, "left": "_Formula", "right": "_Formula"},
 )
 
 _Formula: TypeAlias = _Place | _Dist | _Linear | _Not | _Junction | _Implies | _Window | _Until

@@ -3,10 +3,11 @@
 //! Time is cut at the samples. Each node gets a lower bound at every sample and one over every
 //! *cell*, the closed interval between two samples, and the two are combined upwards:
 //! predicates by Bernstein bounds (design.md, Continuous bound), `always` by the cells that its window
-//! covers, `eventually` and `until` by the best witness among the samples. All operands are lower
-//! bounds and every operator is monotone, so the result is one too; and it never exceeds the exact
-//! robustness on any sampling that contains these samples.
+//! covers, `eventually` and `until` by the best witness among the samples, past operators alike
+//! (`bound_past`). All operands are lower bounds and every operator is monotone, so the result is one
+//! too; and it never exceeds the exact robustness on any sampling that contains these samples.
 
+use super::bound_past;
 use super::error::FormulaError;
 use super::node::{Compiled, Node, Window};
 use super::predicate::Predicate;
@@ -50,9 +51,9 @@ pub fn lower_bound(formula: &Compiled, trajectories: &[&Trajectory]) -> Result<P
 }
 
 /// Lower bounds of one node: `points[k]` at sample k, `cells[k]` over samples k to k + 1.
-struct Bounds {
-    points: Vec<Point>,
-    cells: Vec<Point>,
+pub(super) struct Bounds {
+    pub(super) points: Vec<Point>,
+    pub(super) cells: Vec<Point>,
 }
 
 struct Grid<'a> {
@@ -75,7 +76,22 @@ impl Grid<'_> {
             Node::Release { window, left, right } => {
                 release(&self.bounds(left), &self.bounds(right), *window)
             }
+            Node::Once(window, f) => bound_past::once(&self.bounds(f), *window, self.reached(node)),
+            Node::Historically(window, f) => {
+                bound_past::historically(&self.bounds(f), *window, self.reached(node))
+            }
+            Node::Since { window, left, right } => {
+                bound_past::since(&self.bounds(left), &self.bounds(right), *window, self.reached(node))
+            }
+            Node::Trigger { window, left, right } => {
+                bound_past::trigger(&self.bounds(left), &self.bounds(right), *window, self.reached(node))
+            }
         }
+    }
+
+    /// Number of samples at which `node` can be evaluated.
+    fn reached(&self, node: &Node) -> usize {
+        self.count - node.horizon()
     }
 
     fn predicate(&self, predicate: &Predicate) -> Bounds {

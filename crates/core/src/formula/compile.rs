@@ -101,6 +101,18 @@ impl Compiler<'_> {
                     Node::Release { window, left, right }
                 })
             }
+            Formula::Once { from, to, f } => self.past_node(*from, *to, f, !positive, positive),
+            Formula::Historically { from, to, f } => self.past_node(*from, *to, f, positive, positive),
+            Formula::Since { from, to, left, right } => {
+                let window = self.window(*from, *to)?;
+                let left = Box::new(self.node(left, positive)?);
+                let right = Box::new(self.node(right, positive)?);
+                Ok(if positive {
+                    Node::Since { window, left, right }
+                } else {
+                    Node::Trigger { window, left, right }
+                })
+            }
         }
     }
 
@@ -168,6 +180,19 @@ impl Compiler<'_> {
         let window = self.window(from, to)?;
         let f = Box::new(self.node(f, positive)?);
         Ok(if always { Node::Always(window, f) } else { Node::Eventually(window, f) })
+    }
+
+    fn past_node(
+        &self,
+        from: f64,
+        to: f64,
+        f: &Formula,
+        historically: bool,
+        positive: bool,
+    ) -> Result<Node, FormulaError> {
+        let window = self.window(from, to)?;
+        let f = Box::new(self.node(f, positive)?);
+        Ok(if historically { Node::Historically(window, f) } else { Node::Once(window, f) })
     }
 
     fn window(&self, from: f64, to: f64) -> Result<Window, FormulaError> {

@@ -2,6 +2,7 @@
 
 use super::error::FormulaError;
 use super::node::{Compiled, Node};
+use super::past::{once, since};
 use super::window::{Point, negated, sliding_max, sliding_min, until};
 use crate::types::Vec3;
 
@@ -66,6 +67,17 @@ fn trace<T: AsRef<[Vec3]>>(node: &Node, tracks: &[T], count: usize) -> Vec<Point
         Node::Release { window, left, right } => {
             let (left, right) = (trace(left, tracks, count), trace(right, tracks, count));
             negated(&until(&negated(&left), &negated(&right), *window))
+        }
+        Node::Once(window, f) => once(&trace(f, tracks, count), *window, count - node.horizon()),
+        Node::Historically(window, f) => {
+            negated(&once(&negated(&trace(f, tracks, count)), *window, count - node.horizon()))
+        }
+        Node::Since { window, left, right } => {
+            since(&trace(left, tracks, count), &trace(right, tracks, count), *window, count - node.horizon())
+        }
+        Node::Trigger { window, left, right } => {
+            let (left, right) = (trace(left, tracks, count), trace(right, tracks, count));
+            negated(&since(&negated(&left), &negated(&right), *window, count - node.horizon()))
         }
     }
 }

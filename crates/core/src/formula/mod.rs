@@ -5,10 +5,12 @@
 //! continuous time of trajectories. Both walk the same [`Node`]s with the same window operators.
 
 pub mod bound;
+mod bound_past;
 mod compile;
 mod error;
 pub mod exact;
 mod node;
+mod past;
 mod predicate;
 mod tree;
 mod window;

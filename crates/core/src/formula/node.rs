@@ -2,7 +2,7 @@
 
 use super::predicate::Predicate;
 
-/// A closed window in samples from the time of evaluation.
+/// A closed window in samples from the time of evaluation, ahead or, of past operators, back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// First sample.
@@ -11,7 +11,7 @@ pub struct Window {
     pub to: usize,
 }
 
-/// A node of the negation normal form: `not` and `implies` are gone, `until` has its dual.
+/// A node of the negation normal form: `not` and `implies` are gone, `until` and `since` have their duals.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Node {
     /// A predicate over positions.
@@ -42,6 +42,28 @@ pub enum Node {
         /// Holds until released.
         right: Box<Node>,
     },
+    /// Greatest over the window back, cut at sample 0; minus infinity over none.
+    Once(Window, Box<Node>),
+    /// Least over the window back, cut at sample 0; infinity over none.
+    Historically(Window, Box<Node>),
+    /// `max over t' in the window back of min(right(t'), min over [t', t] of left)`; minus infinity over none.
+    Since {
+        /// Where t' lies.
+        window: Window,
+        /// Holds from t' on.
+        left: Box<Node>,
+        /// Holds at t'.
+        right: Box<Node>,
+    },
+    /// The dual of since: `min over t' in the window back of max(right(t'), max over [t', t] of left)`.
+    Trigger {
+        /// Where t' lies.
+        window: Window,
+        /// Makes up for `right` from then on.
+        left: Box<Node>,
+        /// Held, but for `left`.
+        right: Box<Node>,
+    },
 }
 
 impl Node {
@@ -54,6 +76,10 @@ impl Node {
             Self::Always(w, f) | Self::Eventually(w, f) => w.to.saturating_add(f.horizon()),
             Self::Until { window, left, right } | Self::Release { window, left, right } => {
                 window.to.saturating_add(left.horizon().max(right.horizon()))
+            }
+            Self::Once(w, f) | Self::Historically(w, f) => f.horizon().saturating_sub(w.from),
+            Self::Since { window, left, right } | Self::Trigger { window, left, right } => {
+                left.horizon().max(right.horizon().saturating_sub(window.from))
             }
         }
     }

@@ -125,6 +125,37 @@ pub enum Formula {
         /// Must hold at the switch.
         right: Box<Formula>,
     },
+    /// `once[from, to] f`: at some time of the window before now. The past begins at mission time 0: a
+    /// window is cut there, and nothing was once in an empty one (robustness minus infinity).
+    Once {
+        /// Window end, back from now [s].
+        from: f64,
+        /// Window start, back from now [s].
+        to: f64,
+        /// Operand.
+        f: Box<Formula>,
+    },
+    /// `historically[from, to] f`: all the time of the window before now; true of an empty one (infinity).
+    Historically {
+        /// Window end, back from now [s].
+        from: f64,
+        /// Window start, back from now [s].
+        to: f64,
+        /// Operand.
+        f: Box<Formula>,
+    },
+    /// `left since[from, to] right`: `max over t' of min(right(t'), min over [t', t] of left)`, t' in the
+    /// window before now; until turned round in time.
+    Since {
+        /// Window end, back from now [s].
+        from: f64,
+        /// Window start, back from now [s].
+        to: f64,
+        /// Must hold from t' on, at t' and now included.
+        left: Box<Formula>,
+        /// Must hold at t'.
+        right: Box<Formula>,
+    },
 }
 
 /// A named conjunct of the mission formula.

@@ -153,11 +153,15 @@ fn all_formulas() -> Vec<Formula> {
         Formula::Always { from, to, f: boxed() },
         Formula::Eventually { from, to, f: boxed() },
         Formula::Until { from, to, left: boxed(), right: boxed() },
+        Formula::Once { from, to, f: boxed() },
+        Formula::Historically { from, to, f: boxed() },
+        Formula::Since { from, to, left: boxed(), right: boxed() },
     ];
     formulas.iter().for_each(|formula| match formula {
         Formula::In { .. } | Formula::Outside { .. } | Formula::Dist { .. } | Formula::Linear { .. } => {}
         Formula::Not { .. } | Formula::And { .. } | Formula::Or { .. } | Formula::Implies { .. } => {}
         Formula::Always { .. } | Formula::Eventually { .. } | Formula::Until { .. } => {}
+        Formula::Historically { .. } | Formula::Once { .. } | Formula::Since { .. } => {}
     });
     formulas
 }

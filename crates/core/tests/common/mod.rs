@@ -83,23 +83,44 @@ pub fn window() -> impl Strategy<Value = (f64, f64)> {
 
 /// Random formulas of the whole language, at most three operators deep.
 pub fn formula() -> impl Strategy<Value = Formula> {
-    predicate().prop_recursive(3, 12, 3, |inner| {
-        let boxed = || inner.clone().prop_map(Box::new);
-        prop_oneof![
-            boxed().prop_map(|f| Formula::Not { f }),
-            prop::collection::vec(inner.clone(), 1..4).prop_map(|fs| Formula::And { fs }),
-            prop::collection::vec(inner.clone(), 1..4).prop_map(|fs| Formula::Or { fs }),
-            (boxed(), boxed()).prop_map(|(left, right)| Formula::Implies { left, right }),
-            (window(), boxed()).prop_map(|((from, to), f)| Formula::Always { from, to, f }),
-            (window(), boxed()).prop_map(|((from, to), f)| Formula::Eventually { from, to, f }),
-            (window(), boxed(), boxed()).prop_map(|((from, to), left, right)| Formula::Until {
-                from,
-                to,
-                left,
-                right
-            }),
-        ]
-    })
+    predicate().prop_recursive(3, 12, 3, |inner| prop_oneof![2 => ahead(&inner), 1 => back(&inner)])
+}
+
+/// Random formulas without past operators: their robustness at a sample depends on that and later ones alone.
+pub fn future_formula() -> impl Strategy<Value = Formula> {
+    predicate().prop_recursive(3, 12, 3, |inner| ahead(&inner).boxed())
+}
+
+fn back(inner: &BoxedStrategy<Formula>) -> impl Strategy<Value = Formula> + use<> {
+    let boxed = || inner.clone().prop_map(Box::new);
+    prop_oneof![
+        (window(), boxed()).prop_map(|((from, to), f)| Formula::Once { from, to, f }),
+        (window(), boxed()).prop_map(|((from, to), f)| Formula::Historically { from, to, f }),
+        (window(), boxed(), boxed()).prop_map(|((from, to), left, right)| Formula::Since {
+            from,
+            to,
+            left,
+            right
+        }),
+    ]
+}
+
+fn ahead(inner: &BoxedStrategy<Formula>) -> impl Strategy<Value = Formula> + use<> {
+    let boxed = || inner.clone().prop_map(Box::new);
+    prop_oneof![
+        boxed().prop_map(|f| Formula::Not { f }),
+        prop::collection::vec(inner.clone(), 1..4).prop_map(|fs| Formula::And { fs }),
+        prop::collection::vec(inner.clone(), 1..4).prop_map(|fs| Formula::Or { fs }),
+        (boxed(), boxed()).prop_map(|(left, right)| Formula::Implies { left, right }),
+        (window(), boxed()).prop_map(|((from, to), f)| Formula::Always { from, to, f }),
+        (window(), boxed()).prop_map(|((from, to), f)| Formula::Eventually { from, to, f }),
+        (window(), boxed(), boxed()).prop_map(|((from, to), left, right)| Formula::Until {
+            from,
+            to,
+            left,
+            right
+        }),
+    ]
 }
 
 /// Random walks, one for each of two drones.
