@@ -103,7 +103,12 @@ class _Implies(TypedDict):
 # `from` is a keyword, so that these need the functional form.
 _Window = TypedDict(
     "_Window",
-    {"op": Literal["always", "eventually", "once", "historically"], "from": float, "to": float, "f": "_Formula"},
+    {
+        "op": Literal["always", "eventually", "once", "historically"],
+        "from": float,
+        "to": float,
+        "f": "_Formula",
+    },
 )
 
 _Until = TypedDict(

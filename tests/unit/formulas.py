@@ -45,21 +45,64 @@ def predicates():
     return st.one_of(place, apart, row)
 
 
+def operators(inner, windows, *, past=False, least=1):
+    """Every operator over operands `inner`, with `windows` {from, to}; junctions of at least `least`."""
+    binary = st.sampled_from(["until", "since"] if past else ["until"])
+    unary = ["always", "eventually", *(["once", "historically"] if past else [])]
+    lists = st.lists(inner, min_size=least, max_size=3)
+    return st.one_of(
+        st.builds(lambda f: {"op": "not", "f": f}, inner),
+        st.builds(lambda op, fs: {"op": op, "fs": fs}, st.sampled_from(["and", "or"]), lists),
+        st.builds(lambda left, right: {"op": "implies", "left": left, "right": right}, inner, inner),
+        st.builds(lambda op, w, f: {"op": op, **w, "f": f}, st.sampled_from(unary), windows, inner),
+        st.builds(
+            lambda op, w, left, right: {"op": op, **w, "left": left, "right": right},
+            binary,
+            windows,
+            inner,
+            inner,
+        ),
+    )
+
+
+def horizon(f, sample):
+    """How many samples ahead a formula looks."""
+    if f["op"] in {"once", "historically"}:
+        return max(0, horizon(f["f"], sample) - round(f["from"] / sample))
+    if f["op"] == "since":
+        later = horizon(f["right"], sample) - round(f["from"] / sample)
+        return max(horizon(f["left"], sample), later)
+    inner = [f[key] for key in ("f", "left", "right") if key in f] + f.get("fs", [])
+    return round(f.get("to", 0.0) / sample) + max((horizon(g, sample) for g in inner), default=0)
+
+
+FUTURE, PAST = ("always", "eventually", "until"), ("once", "historically", "since")
+
+
 @st.composite
-def formulas(draw, depth=3, steps=1200):
-    """A formula of at most `depth` operators, one in the other, and a horizon of at most `steps` x T_S."""
-    op = draw(st.sampled_from(["predicate", "not", "and", "or", "implies", "always", "eventually", "until"]))
+def formulas(draw, depth=3, steps=1200, now=0):
+    """A formula as the parser reads it in a mission of `now` + `steps` samples of T_S.
+
+    At most `depth` operators, one in the other; evaluated at sample `now` at the latest.
+    """
+    op = draw(st.sampled_from(["predicate", "not", "and", "or", "implies", *FUTURE, *PAST]))
     if depth == 0 or op == "predicate":
         return draw(predicates())
-    if op in {"always", "eventually", "until"}:
+    if op in FUTURE:
         start = draw(st.integers(0, steps // 2))
         end = draw(st.integers(start, max(start, steps // 2)))
+        left = right = formulas(depth=depth - 1, steps=steps - end, now=now + end)
+    elif op in PAST:
+        start = draw(st.integers(0, now))
+        end = draw(st.integers(start, now + steps))
+        left = formulas(depth=depth - 1, steps=steps, now=now)
+        right = formulas(depth=depth - 1, steps=steps + start, now=now - start)
+    if op in {*FUTURE, *PAST}:
         window = {"op": op, "from": round(start * T_S, 9), "to": round(end * T_S, 9)}
-        inner = formulas(depth=depth - 1, steps=steps - end)
-        if op == "until":
-            return {**window, "left": draw(inner), "right": draw(inner)}
-        return {**window, "f": draw(inner)}
-    inner = formulas(depth=depth - 1, steps=steps)
+        if op in {"until", "since"}:
+            return {**window, "left": draw(left), "right": draw(right)}
+        return {**window, "f": draw(right)}
+    inner = formulas(depth=depth - 1, steps=steps, now=now)
     if op == "not":
         return {"op": op, "f": draw(inner)}
     if op == "implies":

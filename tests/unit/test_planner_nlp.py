@@ -10,7 +10,7 @@ import pytest
 from fleet import _core
 from fleet.certificate import verify
 from fleet.planner import plan
-from fleet.planner.smooth import smooth_robustness
+from fleet.planner.smooth import NEVER, smooth_robustness
 from fleet.scenario import load
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -37,8 +37,8 @@ REGIONS = {"a": box([-2, -2, -2], [1, 1, 1]), "b": box([0, -1, -1], [3, 2, 2])}
 WIRE = [{"name": n, "shape": [{"a": list(f[:3]), "b": f[3]} for f in faces]} for n, faces in REGIONS.items()]
 
 
-def random_formula(rng: np.random.Generator, depth: int) -> dict:
-    """A random formula over drones p and q with short windows."""
+def random_formula(rng: np.random.Generator, depth: int, past: bool = False) -> dict:
+    """A random formula over drones p and q with short windows, with past operators or without."""
     if depth == 0:
         drone, region = str(rng.choice(["p", "q"])), str(rng.choice(["a", "b"]))
         return [
@@ -47,7 +47,7 @@ def random_formula(rng: np.random.Generator, depth: int) -> dict:
             {"op": "dist", "a": "p", "b": "q", "cmp": str(rng.choice(["ge", "le"])), "value": 2.0},
             {"op": "linear", "terms": [{"drone": drone, "axis": "y", "coef": 1.5}], "constant": 0.3},
         ][int(rng.integers(4))]
-    kids = [random_formula(rng, depth - 1) for _ in range(2)]
+    kids = [random_formula(rng, depth - 1, past) for _ in range(2)]
     window = {"from": SAMPLE * int(rng.integers(0, 3)), "to": SAMPLE * int(rng.integers(3, 6))}
     return [
         {"op": "not", "f": kids[0]},
@@ -57,15 +57,21 @@ def random_formula(rng: np.random.Generator, depth: int) -> dict:
         {"op": "always", **window, "f": kids[0]},
         {"op": "eventually", **window, "f": kids[0]},
         {"op": "until", **window, "left": kids[0], "right": kids[1]},
-    ][int(rng.integers(7))]
+        {"op": "once", **window, "f": kids[0]},
+        {"op": "historically", **window, "f": kids[0]},
+        {"op": "since", **window, "left": kids[0], "right": kids[1]},
+    ][int(rng.integers(10 if past else 7))]
 
 
 @pytest.mark.parametrize("seed", range(60))
 def test_smooth_robustness_is_below_the_exact_one_and_comes_near_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    formula = random_formula(rng, int(rng.integers(1, 4)))
+    formula = random_formula(rng, int(rng.integers(1, 4)), past=seed % 3 == 0)
+    if seed % 3 == 0:  # late enough to have a past
+        formula = {"op": "always", "from": 5 * SAMPLE, "to": 6 * SAMPLE, "f": formula}
     positions = np.cumsum(rng.normal(0, 0.5, (2, 24, 3)), axis=1)
     exact, _ = _core.Fleet(["p", "q"], WIRE).evaluate(formula, positions, SAMPLE)
+    exact = np.clip(exact, -NEVER, NEVER)
     loose, sharp = (smooth_robustness(formula, ["p", "q"], positions, REGIONS, SAMPLE, c) for c in (5, 500))
     assert loose <= exact + 1e-9
     assert sharp <= exact + 1e-9

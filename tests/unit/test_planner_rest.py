@@ -175,6 +175,32 @@ def test_signals_are_exact_and_duties_are_enough(seed: int) -> None:
     assert least <= exact[0] + 1e-9
 
 
+@pytest.mark.parametrize("seed", range(120))
+def test_duties_of_past_operators_are_enough(seed: int) -> None:
+    """Over intervals late enough to have a past, and at the start, where windows are cut at time 0."""
+    rng = np.random.default_rng(seed)
+    inner = random_formula(rng, int(rng.integers(1, 3)), past=True)
+    back = ("once", "historically", "since")[seed % 3]
+    window = {"from": SAMPLE * (seed % 2), "to": SAMPLE * 4}
+    f: dict = {"op": back, **window, "left": random_formula(rng, 1, past=True), "right": inner, "f": inner}
+    for key in ("f",) if back == "since" else ("left", "right"):
+        del f[key]
+    f = {"op": "not", "f": f} if seed % 5 == 0 else f
+    around = ("always", "eventually")[seed % 7 // 4]
+    formula = negation_normal({"op": around, "from": SAMPLE * (seed % 4), "to": SAMPLE * 7, "f": f})
+    trace = np.cumsum(rng.normal(0, 0.5, (2, 40, 3)), axis=1)
+    fleet = _core.Fleet(["p", "q"], WIRE)
+    signals = Signals(fleet, trace, SAMPLE)
+    exact = fleet.robustness(formula, trace, SAMPLE)
+    assert signals.of_part(formula)[: len(exact)] == pytest.approx(exact)
+    for sketch in (False, True):
+        duties = choose([Rest("c", formula)], signals, np.inf, sketch=sketch)
+        values = [float(signals.of_part(d.predicate)[d.first : d.last + 1].min()) for d in duties]
+        if exact[0] > -np.inf:  # what lies before the mission cannot be made good by any duty
+            assert min(values, default=np.inf) <= exact[0] + 1e-9
+        assert all(0 <= d.first <= d.last < trace.shape[1] for d in duties)
+
+
 @pytest.mark.parametrize(
     ("first", "last", "a", "b"), [(0, 800, 0, 400), (3, 9, 2, 4), (0, 5, 0, 100), (0, 100, 7, 9)]
 )

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from fleet import _core
+from tests.unit.formulas import horizon as ahead
+from tests.unit.formulas import operators
 
 Formula = dict[str, Any]
 Array = NDArray[np.float64]
@@ -70,13 +72,31 @@ def oracle(f: Formula, x: Array, k: int) -> float:
                 min(oracle(f["right"], x, j), *(oracle(f["left"], x, i) for i in range(k, j + 1)))
                 for j in window()
             )
+    return past(f, x, k)
+
+
+def past(f: Formula, x: Array, k: int) -> float:
+    """Robustness at sample k of what looks back; the past begins at sample 0."""
+    window = range(max(0, k - round(f["to"] / SAMPLE)), k - round(f["from"] / SAMPLE) + 1)
+    match f["op"]:
+        case "once":
+            return max((oracle(f["f"], x, j) for j in window), default=-np.inf)
+        case "historically":
+            return min((oracle(f["f"], x, j) for j in window), default=np.inf)
+        case "since":
+            return max(
+                (
+                    min(oracle(f["right"], x, j), *(oracle(f["left"], x, i) for i in range(j, k + 1)))
+                    for j in window
+                ),
+                default=-np.inf,
+            )
     raise AssertionError(f["op"])
 
 
 def horizon(f: Formula) -> int:
     """How many samples ahead a formula looks."""
-    inner = [f[key] for key in ("f", "left", "right") if key in f] + f.get("fs", [])
-    return round(f.get("to", 0.0) / SAMPLE) + max((horizon(g) for g in inner), default=0)
+    return int(ahead(f, SAMPLE))
 
 
 drones = st.sampled_from(DRONES)
@@ -104,26 +124,12 @@ windows = st.tuples(st.integers(0, 3), st.integers(0, 4)).map(
 )
 
 
-def operators(inner: st.SearchStrategy[Formula]) -> st.SearchStrategy[Formula]:
-    """Every operator over operands `inner`."""
-    lists = st.lists(inner, min_size=1, max_size=3)
-    return st.one_of(
-        st.builds(lambda f: {"op": "not", "f": f}, inner),
-        st.builds(lambda op, fs: {"op": op, "fs": fs}, st.sampled_from(["and", "or"]), lists),
-        st.builds(lambda left, right: {"op": "implies", "left": left, "right": right}, inner, inner),
-        st.builds(
-            lambda op, w, f: {"op": op, **w, "f": f},
-            st.sampled_from(["always", "eventually"]),
-            windows,
-            inner,
-        ),
-        st.builds(
-            lambda w, left, right: {"op": "until", **w, "left": left, "right": right}, windows, inner, inner
-        ),
-    )
-
-
-formulas = st.recursive(st.one_of(regional, pairs, linear), operators, max_leaves=5)
+formulas = st.recursive(
+    st.one_of(regional, pairs, linear), lambda inner: operators(inner, windows), max_leaves=5
+)
+whole_language = st.recursive(
+    st.one_of(regional, pairs, linear), lambda inner: operators(inner, windows, past=True), max_leaves=5
+)
 
 
 def random_walk(n: int, seed: int) -> Array:
@@ -136,7 +142,7 @@ def random_walk(n: int, seed: int) -> Array:
 
 @seed(1)
 @settings(max_examples=400, deadline=None)
-@given(formulas, st.integers(1, 5), st.integers(0, 2**32 - 1))
+@given(whole_language, st.integers(1, 5), st.integers(0, 2**32 - 1))
 def test_every_formula_has_the_robustness_of_its_definition(f: Formula, extra: int, walk: int) -> None:
     x = random_walk(horizon(f) + extra, walk)
     expected = [oracle(f, x, k) for k in range(extra)]
@@ -149,7 +155,7 @@ def test_every_formula_has_the_robustness_of_its_definition(f: Formula, extra: i
 
 @seed(2)
 @settings(max_examples=100, deadline=None)
-@given(formulas, st.integers(0, 2**32 - 1))
+@given(whole_language, st.integers(0, 2**32 - 1))
 def test_one_sample_too_few_is_refused(f: Formula, walk: int) -> None:
     x = random_walk(horizon(f), walk)
     with pytest.raises(ValueError, match="ahead"):

@@ -1,8 +1,8 @@
 """Exact robustness from Rust against rtamt, an implementation by others.
 
 Predicates are fed to rtamt as variables that hold their robustness, so that only temporal and Boolean
-operators are compared. rtamt's until leaves out the left side at the switch, ours has it in: ours
-`a until b` is rtamt's `a until (a and b)`.
+operators are compared. rtamt's until and since leave out the left side at the switch, ours have it in:
+ours `a until b` is rtamt's `a until (a and b)`. Both begin the past at the first sample.
 """
 
 from typing import Any
@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from fleet import _core
+from tests.unit.formulas import horizon as ahead
+from tests.unit.formulas import operators
 
 Formula = dict[str, Any]
 Array = NDArray[np.float64]
@@ -41,18 +43,17 @@ def text(f: Formula) -> str:
             return "(" + f" {f['op']} ".join(map(text, f["fs"])) + ")"
         case "implies":
             return f"({text(f['left'])} implies {text(f['right'])})"
-        case "always" | "eventually":
+        case "always" | "eventually" | "once" | "historically":
             return f"({f['op']}{window} {text(f['f'])})"
-        case "until":
+        case "until" | "since":
             left, right = text(f["left"]), text(f["right"])
-            return f"({left} until{window} ({left} and {right}))"
+            return f"({left} {f['op']}{window} ({left} and {right}))"
     raise AssertionError(f["op"])
 
 
 def horizon(f: Formula) -> int:
     """How many samples ahead a formula looks."""
-    inner = [f[key] for key in ("f", "left", "right") if key in f] + f.get("fs", [])
-    return int(f.get("to", 0)) + max((horizon(g) for g in inner), default=0)
+    return int(ahead(f, 1.0))
 
 
 def by_rtamt(f: Formula, x: Array) -> list[float]:
@@ -69,26 +70,11 @@ def by_rtamt(f: Formula, x: Array) -> list[float]:
 windows = st.tuples(st.integers(0, 4), st.integers(0, 5)).map(lambda w: {"from": w[0], "to": w[0] + w[1]})
 
 
-def operators(inner: st.SearchStrategy[Formula]) -> st.SearchStrategy[Formula]:
-    """Every operator over operands `inner`."""
-    lists = st.lists(inner, min_size=2, max_size=3)
-    return st.one_of(
-        st.builds(lambda f: {"op": "not", "f": f}, inner),
-        st.builds(lambda op, fs: {"op": op, "fs": fs}, st.sampled_from(["and", "or"]), lists),
-        st.builds(lambda left, right: {"op": "implies", "left": left, "right": right}, inner, inner),
-        st.builds(
-            lambda op, w, f: {"op": op, **w, "f": f},
-            st.sampled_from(["always", "eventually"]),
-            windows,
-            inner,
-        ),
-        st.builds(
-            lambda w, left, right: {"op": "until", **w, "left": left, "right": right}, windows, inner, inner
-        ),
-    )
-
-
-formulas = st.recursive(st.sampled_from(SIGNALS).map(signal), operators, max_leaves=5)
+formulas = st.recursive(
+    st.sampled_from(SIGNALS).map(signal),
+    lambda inner: operators(inner, windows, past=True, least=2),
+    max_leaves=5,
+)
 
 
 @seed(1)

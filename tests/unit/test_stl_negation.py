@@ -20,7 +20,7 @@ def trace(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(60))
 def test_negation_turns_the_sign_and_normal_form_keeps_it(seed: int) -> None:
-    formula = random_formula(np.random.default_rng(seed), 3)
+    formula = random_formula(np.random.default_rng(seed), 3, past=seed % 2 == 1)
     exact = FLEET.robustness(formula, trace(seed), SAMPLE)
     turned = FLEET.robustness({"op": "not", "f": formula}, trace(seed), SAMPLE)
     assert turned == pytest.approx(-exact)

@@ -25,7 +25,8 @@ def visit(part):
 def parts(form):
     """The formula of each part of a normal form."""
     for event in form.events:
-        f = {"op": "or", "fs": [visit(choice) for choice in event.choices]}
+        stay = {"op": "always", "from": 0.0, "to": event.dwell}
+        f = {"op": "or", "fs": [{**stay, "f": visit(choice)} for choice in event.choices]}
         yield {"op": "eventually", "from": event.window[0], "to": event.window[1], "f": f}
     for gather in form.gathers:
         f = {"op": "and", "fs": [visit(part) for part in gather.visits]}
@@ -41,7 +42,9 @@ def wrapped(formula):
     whole = {"op": "always", "from": 0.0, "to": T, "f": formula}
     later = {"op": "eventually", "from": 0.0, "to": T, "f": formula}
     both = {"op": "and", "fs": [whole, {"op": "and", "fs": [later, whole]}]}
-    return st.sampled_from([formula, whole, later, both, {"op": "or", "fs": [later, later]}])
+    stay = {"op": "always", "from": 0.0, "to": 0.5, "f": formula}
+    stays = {"op": "eventually", "from": 0.0, "to": T - 0.5, "f": {"op": "or", "fs": [stay, stay]}}
+    return st.sampled_from([formula, whole, later, both, {"op": "or", "fs": [later, later]}, stays])
 
 
 INSTANT = st.one_of(formulas(depth=2, steps=0), formulas(depth=1, steps=0))
@@ -79,6 +82,12 @@ def test_the_papers_mission_has_no_rest():
     ("text", "kinds"),
     [
         ("some d: eventually[0,5] d in tr1", (1, 0, 0, 0)),
+        ("eventually[0,5] stay 2 d1 in tr1", (1, 0, 0, 0)),
+        ("some d: eventually[0,5] stay 2 (d in tr1)", (1, 0, 0, 0)),
+        ("eventually[0,5] some d: stay 2 d in tr1", (1, 0, 0, 0)),
+        ("eventually[0,5] (stay 2 d1 in tr1 or d2 in tr1)", (0, 0, 0, 1)),
+        ("eventually[0,5] always[1,2] d1 in tr1", (0, 0, 0, 1)),
+        ("eventually[0,5] once[0,2] d1 in tr1", (0, 0, 0, 1)),
         ("eventually[0,5] (d1 in tr1 and d2 in tr2)", (0, 1, 0, 0)),
         ("eventually[0,5] d1 in tr1 and always[0,T] d1.z >= 1", (1, 0, 1, 0)),
         ("eventually[0,5] d1 in tr1 or eventually[0,6] d2 in tr1", (0, 0, 0, 1)),
@@ -93,6 +102,14 @@ def test_shapes(text, kinds):
     words = Vocabulary(DRONES, ("tower",), ("tr1", "tr2"), T=60.0, T_s=0.05, delta_min=3.0)
     form = normal_form(parse(text, words), words.T)
     assert (len(form.events), len(form.gathers), len(form.invariants), len(form.rest)) == kinds
+
+
+def test_stays_have_their_dwell():
+    words = Vocabulary(DRONES, ("tower",), ("tr1", "tr2"), T=60.0, T_s=0.05, delta_min=3.0)
+    form = normal_form(parse("eventually[0,40] some d: stay 2 d in tr1", words), words.T)
+    (event,) = form.events
+    assert (event.window, event.dwell) == ((0.0, 40.0), 2.0)
+    assert [choice.drone for choice in event.choices] == list(DRONES)
 
 
 def test_drones_in_order_of_appearance():

@@ -9,10 +9,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fleet.errors import FormulaError
-from fleet.stl import RESERVED, Vocabulary, clause_text, default_formula, is_name, parse, to_text
+from fleet.stl import RESERVED, Clause, Vocabulary, clause_text, default_formula, is_name, parse, to_text
 from tests.unit.formulas import DRONES, formulas
 
-WORDS = Vocabulary(DRONES, ("tower", "cable"), ("tr1", "tr2"), T=60.0, T_s=0.05, delta_min=3.0)
+WORDS = Vocabulary(
+    DRONES, ("tower", "cable"), ("tr1", "tr2"), T=60.0, T_s=0.05, delta_min=3.0, regions=("yard",)
+)
 
 
 def one(text, words=WORDS):
@@ -45,6 +47,10 @@ def no(f):
 
 def until(left, right, start, end):
     return {"op": "until", "from": start, "to": end, "left": left, "right": right}
+
+
+def since(left, right, start, end):
+    return {**until(left, right, start, end), "op": "since"}
 
 
 def timed(op, start, end, f):
@@ -86,6 +92,28 @@ def linear(constant, **coefs):
         (f"G[0,1] F[2,3] {a}", timed("always", 0.0, 1.0, timed("eventually", 2.0, 3.0, A))),
         (f"{a} U[0,5] {b}", until(A, B, 0.0, 5.0)),
         (f"{a} release[0,5] {b}", {"op": "not", "f": until(no(A), no(B), 0.0, 5.0)}),
+        # Stays, and the past; windows that look back end at mission time 0 or after it.
+        (f"stay 2 {a}", timed("always", 0.0, 2.0, A)),
+        (f"stay (T/4) ({a} and {b})", timed("always", 0.0, 15.0, both(A, B))),
+        (
+            "eventually[0,40] some d: stay 2.5 d in tr1",
+            timed(
+                "eventually", 0.0, 40.0, either(*(timed("always", 0.0, 2.5, visit(d, "tr1")) for d in DRONES))
+            ),
+        ),
+        (f"once[0,3] {a}", timed("once", 0.0, 3.0, A)),
+        (
+            f"always[5,T] historically[1,T] {a}",
+            timed("always", 5.0, 60.0, timed("historically", 1.0, 60.0, A)),
+        ),
+        (f"{a} since[0,5] {b} and {c}", both(since(A, B, 0.0, 5.0), C)),
+        (f"{a} since[0,5] {b} until[1,2] {c}", since(A, until(B, C, 1.0, 2.0), 0.0, 5.0)),
+        # What is looked back at from late in the mission may look ahead to its end again.
+        (
+            f"eventually[0,40] once[10,20] always[0,30] {a}",
+            timed("eventually", 0.0, 40.0, timed("once", 10.0, 20.0, timed("always", 0.0, 30.0, A))),
+        ),
+        ("d1 in yard", visit("d1", "yard")),
         (f"{c} or {a} release[1,2] not {b}", either(C, no(until(no(A), no(no(B)), 1.0, 2.0)))),
         # The body of a quantifier reaches to the right as far as it can, also inside always.
         ("all d: d in tr1", both(visit("d1", "tr1"), visit("d2", "tr1"), visit("d3", "tr1"))),
@@ -217,6 +245,22 @@ def test_what_is_true_in_any_case_is_left_out():
         ("eventually[0,2T] d1 in tr1", (1, 11), "ends at 120 s; the mission ends at T = 60 s"),
         ("always[0,50] eventually[0,20] d1 in tr1", (1, 24), "reach to 50 s"),
         ("d1 in tr1 until[0,61] d2 in tr1", (1, 16), "61"),
+        ("stay -2 d1 in tr1", (1, 6), "a stay of -2 s is not legal; need a number of seconds of 0 or more"),
+        (
+            "stay 2.01 d1 in tr1",
+            (1, 6),
+            "2.01 s is not a multiple of T_s = 0.05 s; next to it are 2 and 2.05",
+        ),
+        ("stay 61 d1 in tr1", (1, 6), "the stay ends at 61 s; the mission ends at T = 60 s"),
+        ("eventually[0,59] stay 2 d1 in tr1", (1, 23), "inside windows that reach to 59 s"),
+        ("stay (d1.x) d1 in tr1", (1, 7), "a stay is not legal; need a number"),
+        ("stay d1 in tr1", (1, 6), "expected '\\(', '-', a number"),
+        ("once[1,2] d1 in tr1", (1, 5), "looks back 1 s or more at mission time 0"),
+        ("always[0,5] d1 in tr1 since[6,7] d2 in tr1", (1, 28), "looks back 6 s or more"),
+        ("always[0,5] historically[0,61] d1 in tr1", (1, 25), "looks back 61 s; the mission lasts T = 60 s"),
+        ("always[0,9] once[2,1] d1 in tr1", (1, 17), "start <= end"),
+        ("d1 in yard2", (1, 7), "legal: workspace, obstacles, home, tr1, tr2, tower, cable, yard"),
+        ("all yard: yard in tr1", (1, 5), "is a drone or region"),
         ("always[5,4] d1 in tr1", (1, 7), "start <= end"),
         ("always[-1,4] d1 in tr1", (1, 7), "start <= end"),
         ("always[0,d1.x] d1 in tr1", (1, 10), "number"),
@@ -267,6 +311,28 @@ def test_refusal_points_at_the_place(text, place, words):
 @example(linear(-1e-07, d1_x=-1, d1_y=1e16))
 def test_parse_undoes_print(formula):
     assert one(to_text(formula)) == formula
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(
+    st.lists(
+        st.builds(
+            Clause,
+            st.from_regex(r"[a-z]{2,5}_[0-9]", fullmatch=True),
+            st.just(""),
+            formulas(depth=2),
+            st.one_of(st.just(1.0), st.floats(1e-3, 1e3)),
+            st.integers(0, 1_000_000),
+        ),
+        min_size=1,
+        max_size=3,
+        unique_by=lambda clause: clause.id,
+    )
+)
+def test_parse_undoes_print_of_clauses(clauses):
+    """Weights and priorities included; the text of a clause is what was read."""
+    read = parse("\n".join(map(clause_text, clauses)), WORDS)
+    assert read == [replace(clause, text=to_text(clause.formula)) for clause in clauses]
 
 
 @settings(max_examples=400, deadline=None, derandomize=True)

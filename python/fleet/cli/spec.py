@@ -39,7 +39,8 @@ def spec(
         answer.fields["clauses"] = parsed(loaded, form)
         answer.fields["normal_form"] = normal_form(form)
         answer.fields["warnings"] = [
-            {"clause": d.clause, "code": d.code, "message": d.message} for d in doubts(loaded)
+            {"clause": d.clause, "code": d.code, "message": d.message, "others": list(d.others)}
+            for d in doubts(loaded)
         ]
         if not as_json:
             show(answer)
@@ -135,4 +136,6 @@ def show(answer: Reply) -> None:
     for one in answer.fields["warnings"]:
         answer.say(f"warning: @{one['clause']} is {one['code']}: {one['message']}")
     if not answer.fields["warnings"]:
-        answer.say("no clause is contradictory or vacuous, as far as can be told without planning")
+        answer.say(
+            "no clause is contradictory, vacuous or implied by others, as far as can be told without planning"
+        )

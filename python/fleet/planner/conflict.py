@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from fleet.doubts import Judge
 from fleet.errors import Conflict, InfeasibleError, Need
 
+from .judge import Judge
 from .necessary import Geometry, Impossible, impossible_margins
 from .problem import Problem
 from .progress import Progress, TimeUp, silent

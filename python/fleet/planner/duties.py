@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from . import clearance as near
+from .duty import Duty
 from .knots import Array, Grid, Pieces, cut, merge, refine
 from .problem import Problem
 from .rows import Block, half_spaces, joined, separation
 from .signals import Signals, positions
 from .spec import Invariant, Specification, predicate
 from .weights import added, slack_of, weighed
-from .witness import Duty, choose
+from .witness import choose
 
 #: Tilts of the planes that keep a pair together, about a quarter turn's third around the line between them.
 TILTS = 0.45 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])

@@ -63,6 +63,15 @@ class Problem:
         """Weight of a clause; 1 for what the mission does not name, such as coming home at T."""
         return self.weights.get(clause, 1.0)
 
+    def walls(self) -> tuple[str, ...]:
+        """Regions that routes keep off: obstacles, and what no drone may enter all through the mission."""
+        kept: dict[str, set[str]] = {}
+        for inv in self.spec.invariants:
+            if inv.kind == "outside" and inv.window[0] <= 0 and inv.window[1] >= self.horizon - 1e-9:
+                kept.setdefault(inv.region, set()).add(inv.drones[0])
+        closed = (r for r, drones in kept.items() if drones >= set(self.ids))
+        return tuple(dict.fromkeys([*self.obstacles, *closed]))
+
     def pairs(self) -> list[tuple[int, int, Invariant]]:
         """Pairs of drones (a < b) that must keep apart, each once, by the heaviest invariant that says so."""
         found: dict[tuple[int, int, float, tuple[float, float]], Invariant] = {}
@@ -82,10 +91,7 @@ def faces_of(region: Region) -> Array:
 
 def problem(scenario: Scenario) -> Problem:
     """The arrays of a scenario; its mission in normal form."""
-    named: dict[str, Region] = {scenario.workspace.name: scenario.workspace}
-    named |= {o.name: o for o in scenario.obstacles}
-    named |= {t.name: t for t in scenario.targets}
-    named |= {f"home.{d.id}": d.home for d in scenario.drones}
+    named = {region.name: region for region in scenario.every_region}
     mission, limits = scenario.mission, scenario.limits
     given = scenario.assignment
     return Problem(

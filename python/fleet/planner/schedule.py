@@ -213,6 +213,7 @@ def schedules(problem: Problem, bound: float) -> Iterator[Itinerary]:
     that hold over a part of the mission only. Raises InfeasibleError, naming the clause, when even
     flight through at v_max misses a window.
     """
+    problem = replace(problem, obstacles=problem.walls())
     if len(problem.spec.visits) > EXACT:
         found = list(timed_itineraries(problem, survey(problem, bound, local=True)))
         if found:

@@ -15,6 +15,7 @@ from .knots import Array, Grid, sample
 from .problem import Problem
 
 PREDICATES = ("in", "outside", "dist", "linear")
+PAST = ("once", "historically", "since")
 
 
 def positions(problem: Problem, grid: Grid, x: Array) -> Array:
@@ -73,9 +74,13 @@ class Signals:
             table = np.stack([p[: min(map(len, parts))] for p in parts])
             return np.asarray(table.min(axis=0) if op == "and" else table.max(axis=0))
         if op == "not":
-            return -self._until(f["f"])
+            return -(self._since(f["f"]) if f["f"]["op"] == "since" else self._until(f["f"]))
         if op == "until":
             return self._until(f)
+        if op == "since":
+            return self._since(f)
+        if op in PAST:
+            return self._back(f)
         a, b = self.index(f["from"]), self.index(f["to"])
         windows = sliding_window_view(self.of_part(f["f"])[a:], b - a + 1)
         return np.asarray(windows.min(axis=1) if op == "always" else windows.max(axis=1))
@@ -90,4 +95,24 @@ class Signals:
             run = np.minimum(run, left[step : step + n])
             if step >= a:
                 best = np.maximum(best, np.minimum(run, right[step : step + n]))
+        return best
+
+    def _back(self, f: Formula) -> Array:
+        """Extremum over [t - b, t - a], cut at sample 0; infinite where nothing is left of it."""
+        a, b = self.index(f["from"]), self.index(f["to"])
+        nothing = -np.inf if f["op"] == "once" else np.inf
+        padded = np.concatenate([np.full(b, nothing), self.of_part(f["f"])])
+        windows = sliding_window_view(padded, b - a + 1)[: self.trace.shape[1]]
+        return np.asarray(windows.max(axis=1) if f["op"] == "once" else windows.min(axis=1))
+
+    def _since(self, f: Formula) -> Array:
+        """max over t' in [t - b, t - a] of min(right(t'), min over [t', t] of left); t' from sample 0 on."""
+        a, b = self.index(f["from"]), self.index(f["to"])
+        left, right = self.of_part(f["left"]), self.of_part(f["right"])
+        n = min(len(left), len(right) + a)
+        run, best = np.full(n, np.inf), np.full(n, -np.inf)
+        for step in range(min(b + 1, n)):
+            run[step:] = np.minimum(run[step:], left[: n - step])
+            if step >= a:
+                best[step:] = np.maximum(best[step:], np.minimum(run[step:], right[: n - step]))
         return best

@@ -15,12 +15,13 @@ import numpy as np
 from fleet.errors import InfeasibleError
 from fleet.route import leg_time
 
+from .duty import Anchor, Duty
 from .problem import Problem
 from .schedule import Itinerary, schedules
 from .setup import setup, warm_start
 from .signals import Signals, positions
 from .spec import Visit
-from .witness import Anchor, Duty, choose
+from .witness import choose
 
 #: Itineraries made in turn at most.
 ROUNDS = 12

@@ -6,11 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fleet.stl.vocabulary import Formula
 
 from .algebra import Algebra, Numbers, Score
 from .knots import Array
-from .spec import negation_normal
+from .spec import DUAL, negation_normal
+
+#: Robustness that stands for the infinite one of past operators over an empty window [m].
+NEVER = 1e4
 
 
 @dataclass(frozen=True)
@@ -51,15 +56,19 @@ class Smooth:
             parts = self.algebra.beside([self.signal(g, first, last) for g in f["fs"]])
             return self.algebra.least(parts) if op == "and" else self.algebra.most(parts)
         if op == "not":
-            return self.until(f["f"], first, last, dual=True)
-        if op == "until":
-            return self.until(f, first, last, dual=False)
-        if op not in ("always", "eventually"):
+            binary = self.since if f["f"]["op"] == "since" else self.until
+            return binary(f["f"], first, last, dual=True)
+        if op in ("until", "since"):
+            return (self.since if op == "since" else self.until)(f, first, last, dual=False)
+        if op not in DUAL:
             raise ValueError(f"smooth robustness has no operator {op!r}")
         a, b = self.index(f["from"]), self.index(f["to"])
-        inner = self.signal(f["f"], first + a, last + b)
+        if op in ("always", "eventually"):
+            inner = self.signal(f["f"], first + a, last + b)
+        else:
+            inner = self.padded(f["f"], first - b, last - a, NEVER if op == "historically" else -NEVER)
         windows = self.algebra.windows(inner, last - first + 1, b - a + 1)
-        return self.algebra.least(windows) if op == "always" else self.algebra.most(windows)
+        return self.algebra.least(windows) if op in ("always", "historically") else self.algebra.most(windows)
 
     def index(self, t: float) -> int:
         """Sample number of a time [s]."""
@@ -99,6 +108,31 @@ class Smooth:
                 options.append(inner(self.algebra.beside([met[step - a : step - a + n], run])))
         return outer(self.algebra.beside(options))
 
+    def since(self, f: Formula, first: int, last: int, *, dual: bool) -> Any:
+        """`left since[a, b] right` at samples first to last, or its negation when `dual`; as `until`."""
+        a, b, n = self.index(f["from"]), self.index(f["to"]), last - first + 1
+        left, right = (negation_normal(f[side], not dual) for side in ("left", "right"))
+        never = NEVER if dual else -NEVER
+        held, met = self.padded(left, first - b, last, never), self.padded(right, first - b, last - a, never)
+        folds = (self.algebra.least, self.algebra.most)
+        inner, outer = folds[::-1] if dual else folds
+        options, run = [], held[b : b + n]
+        for step in range(b + 1):
+            then = slice(b - step, b - step + n)
+            if step > 0:
+                run = inner(self.algebra.beside([run, held[then]]))
+            if step >= a:
+                options.append(inner(self.algebra.beside([met[then], run])))
+        return outer(self.algebra.beside(options))
+
+    def padded(self, f: Formula, first: int, last: int, before: float) -> Any:
+        """`signal` at samples first to last, `before` at those before sample 0."""
+        pad = np.full(min(0, last + 1) - first, before) if first < 0 else np.zeros(0)
+        if last < 0:
+            return pad
+        known = self.signal(f, max(0, first), last)
+        return self.algebra.below([pad, known]) if len(pad) else known
+
 
 def leaves(formula: Formula, regions: Mapping[str, Array], sample: float) -> int:
     """Number of predicate values (faces of regions apart) below the unrolled tree of a formula.
@@ -120,9 +154,9 @@ def _leaves(f: Formula, regions: Mapping[str, Array], sample: float) -> int:
     if op == "not":
         return _leaves(f["f"], regions, sample)
     a, b = round(f["from"] / sample), round(f["to"] / sample)
-    if op in ("always", "eventually"):
+    if op in DUAL:
         return int(b - a + 1) * _leaves(f["f"], regions, sample)
-    if op != "until":
+    if op not in ("until", "since"):
         raise ValueError(f"smooth robustness has no operator {op!r}")
     left, right = (_leaves(negation_normal(f[side]), regions, sample) for side in ("left", "right"))
     return int(sum(right + (step + 1) * left for step in range(a, b + 1)))

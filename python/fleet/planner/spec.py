@@ -68,8 +68,12 @@ class Specification:
     kinds: dict[str, str] = field(default_factory=dict)
 
 
+DUAL = {"always": "eventually", "eventually": "always", "once": "historically", "historically": "once"}
+"""What the negation of a temporal operator is, over the negation of its operand."""
+
+
 def negation_normal(f: Formula, positive: bool = True) -> Formula:
-    """The formula with `not` and `implies` pushed into predicates; `until` under `not` stays as it is."""
+    """The formula with `not` and `implies` pushed into predicates; `not` stays before `until` and `since`."""
     op = f["op"]
     if op == "not":
         return negation_normal(f["f"], not positive)
@@ -79,12 +83,11 @@ def negation_normal(f: Formula, positive: bool = True) -> Formula:
     if op in ("and", "or"):
         dual = {"and": "or", "or": "and"}
         return {"op": op if positive else dual[op], "fs": [negation_normal(g, positive) for g in f["fs"]]}
-    if op in ("always", "eventually"):
-        dual = {"always": "eventually", "eventually": "always"}
+    if op in DUAL:
         inner = negation_normal(f["f"], positive)
-        return {"op": op if positive else dual[op], "from": f["from"], "to": f["to"], "f": inner}
+        return {"op": op if positive else DUAL[op], "from": f["from"], "to": f["to"], "f": inner}
     if positive:
-        if op == "until":
+        if op in ("until", "since"):
             return {**f, "left": negation_normal(f["left"]), "right": negation_normal(f["right"])}
         return dict(f)
     if op in ("in", "outside"):
@@ -104,17 +107,18 @@ def specification(clauses: Sequence[Clause], horizon: float) -> Specification:
     """Normal form of the clauses of a mission of `horizon` [s].
 
     It starts from `fleet.stl.normal` and then takes up what can still be posed exactly: predicates
-    over a part of the mission, and stays in a region.
+    over a part of the mission.
     """
     form = normal_form([Clause(c.id, c.text, negation_normal(c.formula)) for c in clauses], horizon)
     spec = Specification()
     for event in form.events:
         options = tuple((v.drone, v.region) for v in event.choices)
         drone, region = options[0]
-        if len(options) == 1 and region == f"home.{drone}" and event.window[1] >= horizon - 1e-9:
+        at_end = event.dwell == 0 and event.window[1] >= horizon - 1e-9
+        if len(options) == 1 and region == f"home.{drone}" and at_end:
             spec.homes.append(Home(event.clause, drone, region))
             continue
-        spec.visits.append(Visit(event.clause, options, event.window))
+        spec.visits.append(Visit(event.clause, options, event.window, event.dwell))
     for gather in form.gathers:
         at_home = all(v.region == f"home.{v.drone}" for v in gather.visits)
         if at_home and gather.window[1] >= horizon - 1e-9:
@@ -157,7 +161,7 @@ def predicate(spec: Specification, clause: str, f: Formula, window: tuple[float,
 
 
 def refine(spec: Specification, clause: str, f: Formula) -> None:
-    """Add a part that has no shape of `fleet.stl.normal`: a windowed invariant, a stay, or rest."""
+    """Add a part that has no shape of `fleet.stl.normal`: a windowed invariant, or rest."""
     if f["op"] == "always":
         window, g = (f["from"], f["to"]), f["f"]
         if g["op"] == "always":
@@ -169,10 +173,5 @@ def refine(spec: Specification, clause: str, f: Formula) -> None:
             predicate(spec, clause, g, window)
         else:
             spec.rest.append(Rest(clause, f))
-        return
-    stay = f["f"] if f["op"] == "eventually" else f
-    if f["op"] == "eventually" and stay["op"] == "always" and stay["from"] == 0 and stay["f"]["op"] == "in":
-        option = (stay["f"]["drone"], stay["f"]["region"])
-        spec.visits.append(Visit(clause, (option,), (f["from"], f["to"]), stay["to"]))
         return
     spec.rest.append(Rest(clause, f))

@@ -15,36 +15,16 @@ import numpy as np
 
 from fleet.stl.vocabulary import Formula
 
+from . import hindsight
+from .duty import Anchor, Duty, middle_of_best
 from .knots import Array
-from .signals import PREDICATES, Signals
+from .signals import PAST, PREDICATES, Signals
 from .spec import Rest, negation_normal
 
 #: Witnesses in a row fill at most this share of the longest legal gap between them.
 FILLED = 0.85
 #: Robustness taken off a branch that turned out to be out of reach [m]: more than any distance on site.
 OUT_OF_REACH = 1e4
-
-
-@dataclass(frozen=True)
-class Anchor:
-    """A witness: the place `key` of its operator, its sample `at`, and from where to where it may move."""
-
-    key: str
-    at: int
-    low: int
-    high: int
-
-
-@dataclass(frozen=True)
-class Duty:
-    """A predicate that must hold at all samples from `first` to `last`; `branches` led to it."""
-
-    clause: str
-    predicate: Formula
-    first: int
-    last: int
-    anchor: Anchor | None = None
-    branches: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass
@@ -84,6 +64,8 @@ class Choice:
         elif op == "always":
             a, b = self.signals.index(f["from"]), self.signals.index(f["to"])
             self.pose(f["f"], first + a, last + b, f"{key}.f", anchor, branches)
+        elif op in PAST or (op == "not" and f["f"]["op"] in PAST):
+            hindsight.pose(self, f, first, last, key, anchor, branches)
         elif op == "not":
             self.release(f["f"], first, last, key, branches)
         else:
@@ -175,12 +157,6 @@ class Choice:
         self.pose(left, end, end, f"{key}#0.f", freeing, branches)
         if end >= first + a:
             self.pose(right, first + a, end, f"{key}.right", freeing, branches)
-
-
-def middle_of_best(values: Array, low: int, high: int) -> int:
-    """The middle one of the samples from low to high at which `values` is largest."""
-    best = np.flatnonzero(values[low : high + 1] >= values[low : high + 1].max() - 1e-9)
-    return low + int(best[len(best) // 2])
 
 
 def spaced(first: int, last: int, a: int, b: int) -> list[tuple[int, int]]:

@@ -8,6 +8,7 @@ from fleet.errors import FormulaError
 from fleet.scenario.read import Problems, Tables
 from fleet.scenario.tables import Energy, Limits, Mission, Planner, Replan
 from fleet.stl import RESERVED, Vocabulary, default_formula, is_name, parse
+from fleet.stl.extent import decided, too_large
 
 MAX_DRONES = 64
 """Fleet size that is accepted; MAVLink's system ids end at 255 (mavlink.md)."""
@@ -96,6 +97,7 @@ def _names(tables: Tables, problems: Problems) -> bool:
 def _all_names(tables: Tables) -> Iterator[tuple[str, str]]:
     yield from ((f"obstacle[{i}].name", table.name) for i, table in tables.obstacles.items())
     yield from ((f"target[{i}].name", table.name) for i, table in tables.targets.items())
+    yield from ((f"region[{i}].name", table.name) for i, table in tables.regions.items())
     yield from ((f"drone[{i}].id", table.id) for i, table in tables.drones.items())
 
 
@@ -111,12 +113,24 @@ def _formula(tables: Tables, problems: Problems) -> None:
         T=mission.T,
         T_s=mission.T_s,
         delta_min=limits.delta_min,
+        regions=tuple(table.name for table in tables.regions.values()),
     )
     text = mission.formula if mission.formula is not None else default_formula(vocabulary)
     try:
-        parse(text, vocabulary)
+        clauses = parse(text, vocabulary)
     except FormulaError as error:
         problems.add(error.code, "mission.formula", str(error))
+        return
+    large = too_large(clauses, len(vocabulary.drones), mission.T, mission.T_s)
+    if large is not None:
+        problems.add("value", "mission.T_s", f"{mission.T_s:g} s is not legal; {large}")
+        return
+    for clause in clauses:
+        known = decided(clause, mission.T_s)
+        if known is not None:
+            always = "holds" if known else "fails"
+            message = f"clause {clause.id} {always} whatever is flown: it looks back beyond mission time 0"
+            problems.add("formula", "mission.formula", f"{message}, where no window has any samples")
 
 
 def _disturbances(tables: Tables, problems: Problems) -> None:

@@ -44,6 +44,10 @@ def _place(tables: Tables, problems: Problems) -> Placement:
         region = _region(f"target[{i}]", target.name, target, problems)
         if region is not None:
             placed.targets[f"target[{i}].{target.kind}"] = Target.of(region, target.heading)
+    for i, named in tables.regions.items():
+        region = _region(f"region[{i}]", named.name, named, problems)
+        if region is not None:
+            placed.named[f"region[{i}].{named.kind}"] = region
     for i, drone in tables.drones.items():
         home = _region(f"drone[{i}].home", f"home.{drone.id}", drone.home, problems)
         if home is not None:
@@ -77,6 +81,7 @@ def _scenario(name: str, tables: Tables, placed: Placement) -> Scenario:
         energy=tables.energy,
         obstacles=list(placed.obstacles.values()),
         targets=list(placed.targets.values()),
+        named=list(placed.named.values()),
         drones=list(placed.drones.values()),
         disturbances=list(tables.disturbances.values()),
         wind=tables.wind,

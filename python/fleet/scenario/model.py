@@ -48,7 +48,10 @@ class Drone:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A mission with its world and its fleet; made by `load`, never by hand."""
+    """A mission with its world and its fleet; made by `load`, never by hand.
+
+    `named` are the regions that are neither obstacles nor targets.
+    """
 
     name: str
     mission: Mission
@@ -59,15 +62,21 @@ class Scenario:
     energy: Energy | None
     obstacles: list[Region]
     targets: list[Target]
+    named: list[Region]
     drones: list[Drone]
     disturbances: list[Disturbance]
     wind: Wind
     assignment: dict[str, list[str]] | None
 
     def regions(self) -> list[dict[str, Any]]:
-        """All regions as the plan carries them: workspace, obstacles, targets, homes."""
+        """All regions as the plan carries them: workspace, obstacles, targets, named ones, homes."""
+        return [region.wire() for region in self.every_region]
+
+    @cached_property
+    def every_region(self) -> tuple[Region, ...]:
+        """Workspace, obstacles, targets, named regions and homes; no two have one name."""
         homes = [drone.home for drone in self.drones]
-        return [region.wire() for region in (self.workspace, *self.obstacles, *self.targets, *homes)]
+        return (self.workspace, *self.obstacles, *self.targets, *self.named, *homes)
 
     @cached_property
     def vocabulary(self) -> Vocabulary:
@@ -79,6 +88,7 @@ class Scenario:
             T=self.mission.T,
             T_s=self.mission.T_s,
             delta_min=self.limits.delta_min,
+            regions=tuple(region.name for region in self.named),
         )
 
     @cached_property

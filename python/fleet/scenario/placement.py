@@ -24,6 +24,7 @@ class Placement:
     workspace: Region | None = None
     obstacles: dict[str, Region] = field(default_factory=dict)
     targets: dict[str, Target] = field(default_factory=dict)
+    named: dict[str, Region] = field(default_factory=dict)
     drones: dict[str, Drone] = field(default_factory=dict)
 
     @property
@@ -39,6 +40,8 @@ def check(placement: Placement, limits: Limits | None, problems: Problems) -> No
         _distances(placement, limits.delta_min, problems)
     for place, target in placement.targets.items():
         _target(place, target, placement, problems)
+    for place, region in placement.named.items():
+        _named(place, region, placement, problems)
     _homes(placement, problems)
     for place, drone in placement.drones.items():
         _start(place, drone, placement, problems)
@@ -70,6 +73,17 @@ def _target(place: str, target: Target, placement: Placement, problems: Problems
             message = (
                 f"target {target.name} has its centre {center} inside obstacle {obstacle.name}; move it out"
             )
+            problems.add("geometry", place, message)
+
+
+def _named(place: str, region: Region, placement: Placement, problems: Problems) -> None:
+    """Some of it must be where drones may be; what the formula says of it is for `fleet spec` to judge."""
+    if placement.workspace is not None and not placement.workspace.overlaps(region):
+        message = f"region {region.name} is wholly outside the workspace; move it inside"
+        problems.add("geometry", place, message)
+    for obstacle in placement.obstacles.values():
+        if obstacle.covers(region):
+            message = f"region {region.name} is wholly inside obstacle {obstacle.name}; move it out"
             problems.add("geometry", place, message)
 
 

@@ -16,7 +16,7 @@ from fleet.scenario import tables
 T = TypeVar("T", bound=BaseModel)
 
 SINGLE = ("mission", "workspace", "limits", "replan", "planner", "energy", "wind", "assignment")
-REPEATED = ("obstacle", "target", "drone", "disturbance")
+REPEATED = ("obstacle", "target", "region", "drone", "disturbance")
 
 
 class Problems:
@@ -54,6 +54,7 @@ class Tables:
         self.wind = self._one("wind", tables.Wind)
         self.obstacles = self._many("obstacle", tables.Obstacle)
         self.targets = self._many("target", tables.TargetTable)
+        self.regions = self._many("region", tables.NamedRegion)
         self.drones = self._many("drone", tables.DroneTable)
         self.disturbances = self._many("disturbance", tables.Disturbance)
         self.assignment = self._assignment()
@@ -65,8 +66,9 @@ class Tables:
 
     @property
     def complete(self) -> bool:
-        """Whether every obstacle, target and drone of the file could be read."""
-        read = {"obstacle": len(self.obstacles), "target": len(self.targets), "drone": len(self.drones)}
+        """Whether every obstacle, target, region and drone of the file could be read."""
+        read = {"obstacle": len(self.obstacles), "target": len(self.targets)}
+        read |= {"region": len(self.regions), "drone": len(self.drones)}
         return all(count == self.entries(key) for key, count in read.items())
 
     def _one(self, key: str, table: type[T], *, needed: bool = False) -> T | None:

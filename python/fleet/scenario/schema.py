@@ -13,6 +13,7 @@ from fleet.scenario.tables import (
     Energy,
     Limits,
     Mission,
+    NamedRegion,
     Obstacle,
     Planner,
     Replan,
@@ -40,6 +41,7 @@ class Document(Table):
     wind: Wind = Field(default_factory=Wind)
     obstacle: list[Obstacle] = Field(default_factory=list)
     target: list[TargetTable] = Field(default_factory=list)
+    region: list[NamedRegion] = Field(default_factory=list)
     drone: list[DroneTable] = Field(min_length=1, max_length=64)
     disturbance: list[Disturbance] = Field(default_factory=list)
     assignment: dict[str, list[str]] = Field(

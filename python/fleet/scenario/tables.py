@@ -181,6 +181,12 @@ class TargetTable(Shape):
     heading: Heading | None = None
 
 
+class NamedRegion(Shape):
+    """`[[region]]`: a place that the formula speaks of, neither an obstacle nor a target."""
+
+    name: str
+
+
 class DroneTable(Table):
     """`[[drone]]`: its home region, its pad (vehicle centre at rest [m]) and heading on it [rad].
 

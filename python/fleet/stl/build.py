@@ -24,10 +24,10 @@ class Builder(Arithmetic):
         self._instances = 0
 
     def formula(self, node: Node, scope: Scope | None = None, offset: float = 0.0) -> Formula | None:
-        """The formula of `node`, evaluated `offset` seconds or less after mission time 0.
+        """The formula of `node`, evaluated `offset` seconds after mission time 0 at the latest.
 
         Raises:
-            FormulaError: unknown names, bad windows, or a window that reaches beyond T.
+            FormulaError: unknown names, bad windows, or a window that reaches out of the mission.
         """
         build: Callable[[Node, Scope, float], Formula | None] = getattr(self, f"_{node.data.rstrip('_')}")
         return build(node, scope or {}, offset)
@@ -68,6 +68,19 @@ class Builder(Arithmetic):
         f = self.formula(operand, scope, offset + end)
         return None if f is None else {"op": op, "from": start, "to": end, "f": f}
 
+    def _stay(self, node: Node, scope: Scope, offset: float) -> Formula | None:
+        """`stay D f`, for always[0,D] f."""
+        length, operand = (as_tree(child) for child in node.children)
+        form = self.linear(length, {})
+        if not form.is_constant or form.constant < 0:
+            shown = f"of {form.constant:g} s " if form.is_constant else ""
+            raise self.error(length, f"a stay {shown}is not legal; need a number of seconds of 0 or more")
+        self._check_grid(length, form.constant)
+        end = self.words.floor(form.constant)
+        self._check_end(length, end, offset, "stay")
+        f = self.formula(operand, scope, offset + end)
+        return None if f is None else {"op": "always", "from": 0.0, "to": end, "f": f}
+
     def _until(self, node: Node, scope: Scope, offset: float) -> Formula:
         before, window, after = (as_tree(child) for child in node.children)
         start, end = self._window(window, offset)
@@ -81,7 +94,54 @@ class Builder(Arithmetic):
         f["left"], f["right"] = ({"op": "not", "f": f[side]} for side in ("left", "right"))
         return {"op": "not", "f": f}
 
+    # -- the past ------------------------------------------------------------------------------
+
+    def _once(self, node: Node, scope: Scope, offset: float) -> Formula | None:
+        return self._back("once", node, scope, offset)
+
+    def _historically(self, node: Node, scope: Scope, offset: float) -> Formula | None:
+        return self._back("historically", node, scope, offset)
+
+    def _back(self, op: str, node: Node, scope: Scope, offset: float) -> Formula | None:
+        window, operand = (as_tree(child) for child in node.children)
+        start, end = self._window_back(window, offset)
+        f = self.formula(operand, scope, offset - start)
+        return None if f is None else {"op": op, "from": start, "to": end, "f": f}
+
+    def _since(self, node: Node, scope: Scope, offset: float) -> Formula:
+        kept, window, begun = (as_tree(child) for child in node.children)
+        start, end = self._window_back(window, offset)
+        left, right = self._needed(kept, scope, offset), self._needed(begun, scope, offset - start)
+        return {"op": "since", "from": start, "to": end, "left": left, "right": right}
+
+    def _window_back(self, node: Node, offset: float) -> tuple[float, float]:
+        start, end = self._bounds(node)
+        if start > offset + 1e-9:
+            when = f"at {offset:g} s or earlier" if offset else "at mission time 0"
+            raise self.error(
+                node, f"the window looks back {start:g} s or more {when}: nothing lies before the mission"
+            )
+        if end > self.words.T + 1e-9:
+            raise self.error(
+                node, f"the window looks back {end:g} s; the mission lasts T = {self.words.T:g} s"
+            )
+        return start, end
+
+    # -- windows -------------------------------------------------------------------------------
+
     def _window(self, node: Node, offset: float) -> tuple[float, float]:
+        start, end = self._bounds(node)
+        self._check_end(node, end, offset)
+        return start, end
+
+    def _check_end(self, node: Node, end: float, offset: float, what: str = "window") -> None:
+        T = self.words.T
+        if offset + end > T + 1e-9:
+            around = f", inside windows that reach to {offset:g} s" if offset else ""
+            raise self.error(node, f"the {what} ends at {end:g} s{around}; the mission ends at T = {T:g} s")
+
+    def _bounds(self, node: Node) -> tuple[float, float]:
+        """Start and end of a window, on samples."""
         bounds = []
         for child in node.children:
             form = self.linear(as_tree(child), {})
@@ -91,14 +151,10 @@ class Builder(Arithmetic):
                 )
             self._check_grid(as_tree(child), form.constant)
             bounds.append(form.constant)
-        T = self.words.T
         if not 0 <= bounds[0] <= bounds[1] or math.isinf(bounds[1]):
             shown = f"[{bounds[0]:g}, {bounds[1]:g}]"
             raise self.error(node, f"the window {shown} is not legal; need 0 <= start <= end")
         start, end = (self.words.floor(bound) for bound in bounds)
-        if offset + end > T + 1e-9:
-            around = f", inside windows that reach to {offset:g} s" if offset else ""
-            raise self.error(node, f"the window ends at {end:g} s{around}; the mission ends at T = {T:g} s")
         return start, end
 
     def _check_grid(self, node: Node, time: float) -> None:
@@ -154,7 +210,7 @@ class Builder(Arithmetic):
         name = str(token)
         if name in RESERVED or not is_name(name) or name in scope:
             raise self.error(token, f"'{name}' cannot name a drone here; it is reserved or in use")
-        if name in (*words.drones, *words.targets, *words.obstacles):
+        if name in (*words.drones, *words.places):
             raise self.error(token, f"'{name}' is a drone or region of the scenario; choose another letter")
         return name
 
@@ -192,9 +248,9 @@ class Builder(Arithmetic):
             return f"home.{self.drone(owner[0], scope)}"
         if name == "home":
             return f"home.{drone}"
-        if name == "workspace" or name in words.targets or name in words.obstacles:
+        if name == "workspace" or name in words.places:
             return str(name)
-        legal = ", ".join(("workspace", "obstacles", "home", *words.targets, *words.obstacles))
+        legal = ", ".join(("workspace", "obstacles", "home", *words.places))
         raise self.error(name, f"'{name}' is not a region of the scenario; legal: {legal}")
 
     def _ge(self, node: Node, scope: Scope, _offset: float) -> Formula:

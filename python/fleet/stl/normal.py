@@ -22,11 +22,12 @@ class Visit:
 
 @dataclass(frozen=True)
 class Event:
-    """At some time in `window` [s], closed, at least one of `choices` holds."""
+    """At some time in `window` [s], closed, at least one of `choices` holds, from then on for `dwell` [s]."""
 
     clause: str
     window: tuple[float, float]
     choices: tuple[Visit, ...]
+    dwell: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def places_of(formula: Formula) -> list[Visit]:
     """The drones inside regions that a formula speaks of, in order of first appearance."""
     if formula["op"] == "in":
         return [Visit(formula["drone"], formula["region"])]
-    return list(dict.fromkeys(place for child in _children(formula) for place in places_of(child)))
+    return list(dict.fromkeys(place for child in children(formula) for place in places_of(child)))
 
 
 def _mentions(formula: Formula) -> Iterator[str]:
@@ -96,11 +97,11 @@ def _mentions(formula: Formula) -> Iterator[str]:
     elif op == "linear":
         yield from (term["drone"] for term in formula["terms"])
     else:
-        for child in _children(formula):
+        for child in children(formula):
             yield from _mentions(child)
 
 
-def _children(formula: Formula) -> list[Formula]:
+def children(formula: Formula) -> list[Formula]:
     """The operands of a formula, left to right; none for a predicate."""
     if "fs" in formula:
         return list(formula["fs"])
@@ -133,7 +134,7 @@ def _always(clause: str, formula: Formula, T: float) -> Iterator[Event | Gather 
 
 
 def _event(clause: str, formula: Formula) -> Event | Gather | None:
-    """`eventually` of visits, or a disjunction of such over one window (`some d: eventually ...`)."""
+    """`eventually` of visits or stays, or such over one window in a disjunction (`some d: eventually`)."""
     branches = _flat(formula, "or")
     if any(branch["op"] != "eventually" for branch in branches):
         return None
@@ -141,13 +142,21 @@ def _event(clause: str, formula: Formula) -> Event | Gather | None:
     if len(windows) != 1:
         return None
     window = windows.pop()
-    choices = [_visit(part) for branch in branches for part in _flat(branch["f"], "or")]
-    if None not in choices:
-        return Event(clause, window, tuple(visit for visit in choices if visit is not None))
+    stays = [_stay(part) for branch in branches for part in _flat(branch["f"], "or")]
+    dwells = {stay[1] for stay in stays if stay is not None}
+    if None not in stays and len(dwells) == 1:
+        return Event(clause, window, tuple(stay[0] for stay in stays if stay is not None), dwells.pop())
     together = [_visit(part) for part in _flat(formula["f"], "and")] if len(branches) == 1 else [None]
     if None not in together:
         return Gather(clause, window, tuple(visit for visit in together if visit is not None))
     return None
+
+
+def _stay(formula: Formula) -> tuple[Visit, float] | None:
+    """A visit and how long it lasts [s]: `in`, or `always[0,D]` of it."""
+    stays = formula["op"] == "always" and formula["from"] <= 0
+    visit = _visit(formula["f"] if stays else formula)
+    return None if visit is None else (visit, float(formula["to"]) if stays else 0.0)
 
 
 def _visit(formula: Formula) -> Visit | None:

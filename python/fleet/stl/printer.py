@@ -7,7 +7,8 @@ from typing import Any
 from fleet.stl.vocabulary import Clause, Formula
 
 # How tightly each operator binds; an operand that binds less tightly gets parentheses.
-_BINDING = {"implies": 1, "or": 2, "and": 3, "until": 4, "not": 5, "always": 5, "eventually": 5}
+_BINDING = {"implies": 1, "or": 2, "and": 3, "until": 4, "since": 4, "not": 5}
+_BINDING |= dict.fromkeys(("always", "eventually", "once", "historically"), 5)
 _PREDICATE = 6
 
 
@@ -32,12 +33,12 @@ def to_text(formula: Formula) -> str:
         return f" {op} ".join(_operand(f, own + 1) for f in formula["fs"])
     if op == "implies":
         return f"{_operand(formula['left'], own + 1)} -> {_operand(formula['right'], own)}"
-    if op == "until":
+    if op in {"until", "since"}:
         window = _window(formula)
-        return f"{_operand(formula['left'], own + 1)} until{window} {_operand(formula['right'], own)}"
+        return f"{_operand(formula['left'], own + 1)} {op}{window} {_operand(formula['right'], own)}"
     if op == "not":
         return f"not {_operand(formula['f'], own)}"
-    if op in {"always", "eventually"}:
+    if "f" in formula:
         return f"{op}{_window(formula)} {_operand(formula['f'], own)}"
     return _predicate(formula)
 

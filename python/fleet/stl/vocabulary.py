@@ -11,8 +11,9 @@ Formula = dict[str, Any]
 """A formula in the serde form of `crates/core/src/formula/tree.rs`: `{"op": "always", "from": ...}`."""
 
 _OPERATORS = ("always", "eventually", "until", "release", "G", "F", "U", "not", "and", "or", "all", "some")
+_MORE = ("once", "historically", "since", "stay")
 _PREDICATES = ("in", "outside", "dist", "workspace", "obstacles", "home", "T", "delta_min")
-RESERVED = frozenset((*_OPERATORS, *_PREDICATES))
+RESERVED = frozenset((*_OPERATORS, *_MORE, *_PREDICATES))
 """Words with a meaning of their own in formulas; nothing else may be called so."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
@@ -41,7 +42,10 @@ class Clause:
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """What a formula may speak of: drones, regions, T and T_s [s], delta_min [m]."""
+    """What a formula may speak of: drones, regions, T and T_s [s], delta_min [m].
+
+    `regions` are those that are neither obstacles nor targets.
+    """
 
     drones: tuple[str, ...]
     obstacles: tuple[str, ...]
@@ -49,6 +53,12 @@ class Vocabulary:
     T: float
     T_s: float
     delta_min: float
+    regions: tuple[str, ...] = ()
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of the regions that a formula may name, but for the reserved ones."""
+        return (*self.targets, *self.obstacles, *self.regions)
 
     def floor(self, time: float) -> float:
         """The last multiple of T_s that is not after `time` [s] (design.md, Windows).
