@@ -16,8 +16,8 @@ from fleet.errors import InputError
 from fleet.planner import PlanResult, Status, plan
 from fleet.planner.algebra import Numbers, Score
 from fleet.planner.lifted import Lifted
-from fleet.planner.nlp import Program
 from fleet.planner.paper import settled
+from fleet.planner.program import Program
 from fleet.planner.thinning import thinned
 from fleet.scenario import Scenario, load
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from .algebra import Numbers, Score, Symbols
 from .knots import Array
-from .nlp import Program
+from .program import Program
 
 #: Widest row that is folded as it stands.
 PLAIN = 16

@@ -25,8 +25,8 @@ from fleet.stl.vocabulary import Formula
 from .algebra import Score, Symbols
 from .knots import KNOT, Array
 from .lifted import Lifted
-from .nlp import Program
 from .problem import Problem
+from .program import Program
 from .smooth import Smooth
 
 #: Called with the iteration and positions (d, n, 3) [m].
