@@ -51,6 +51,24 @@ def test_rho_reaches_the_bound_and_is_certified(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_the_bound_lies_just_below_the_value_on_any_finer_grid(name: str) -> None:
+    """Within 1 cm at the samples, and not above the exact robustness where those are among the times."""
+    content = planned(name).plan
+    tracks = [_core.Trajectory.from_list(d["trajectory"]) for d in content["drones"]]
+    fleet = _core.Fleet([d["id"] for d in content["drones"]], content["regions"])
+    for clause in content["clauses"]:
+        rho, lower = clause["result"]["rho"], clause["result"]["rho_lower"]
+        assert rho - 0.01 <= lower <= rho
+    for parts in (2, 3, 7):
+        step = content["sample"] / parts
+        times = np.arange(round(content["horizon"] / step) + 1) * step
+        positions = np.stack([np.ascontiguousarray(t.sample(times)[:, :3]) for t in tracks])
+        for clause in content["clauses"]:
+            fine, _ = fleet.evaluate(clause["formula"], positions, step)
+            assert clause["result"]["rho_lower"] <= fine
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_limits_hold_between_samples(name: str) -> None:
     limits = planned(name).plan["limits"]
     states, _ = dense(name)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from fleet.errors import ScenarioError
 from fleet.scenario import load
+from fleet.stl.extent import too_large
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 BASE = tomllib.loads((SCENARIOS / "power_tower.toml").read_text(encoding="utf-8"))
@@ -127,6 +128,21 @@ CASES = [
     ([("target", 2, "box"), [[-1, -1, 9], [1, 1, 11]]], "target[2].box", "inside obstacle tower"),
     ([("target", 2, "box"), [[6.5, 0, 9], [8.5, 2, 11]]], "target[2].box", "outside the workspace"),
     ([("target", 2, "polyhedron"), EMPTY], "target[2]", "exactly one of"),
+    ([("region",), {"name": "yard"}], "region", "[[region]]"),
+    ([("region",), [{"name": "yard"}]], "region[0]", "exactly one of"),
+    ([("region",), [{"name": "stay", "box": BOX}]], "region[0].name", "reserved"),
+    ([("region",), [{"name": "tr1", "box": BOX}]], "region[0].name", "also the name of target[0]"),
+    ([("region",), [{"name": "yard", "box": BOX, "heading": 1.0}]], "region[0].heading", "polyhedron, name"),
+    (
+        [("region",), [{"name": "yard", "box": [[8, 0, 0], [9, 1, 1]]}]],
+        "region[0].box",
+        "outside the workspace",
+    ),
+    (
+        [("region",), [{"name": "yard", "box": [[-1, -1, 1], [1, 1, 3]]}]],
+        "region[0].box",
+        "inside obstacle tower",
+    ),
     ([("drone",), DELETE], "drone", "0 drones"),
     ([("drone", 0, "id"), "d2"], "drone[1].id", "drone[0]"),
     ([("drone", 0, "id"), "tr1"], "drone[0].id", "target[0]"),
@@ -160,6 +176,20 @@ CASES = [
     ([("mission", "formula"), "always[0,2T] d1 in tr1"], "mission.formula", "line 1, column 7"),
     ([("mission", "formula"), "d1 in\ntr9"], "mission.formula", "line 2, column 1"),
     ([("mission", "formula"), ""], "mission.formula", "too early"),
+    ([("mission", "formula"), "eventually[0,5] d1 in yard"], "mission.formula", "'yard' is not a region"),
+    ([("mission", "formula"), "eventually[0,5] d9 in tr1"], "mission.formula", "'d9' is not a drone"),
+    ([("mission", "formula"), "eventually[5,4] d1 in tr1"], "mission.formula", "start <= end"),
+    ([("mission", "formula"), "eventually[0,9] stay -1 d1 in tr1"], "mission.formula", "a stay of -1 s"),
+    (
+        [("mission", "formula"), "@odd always[0,5] once[1,2] d1 in tr1"],
+        "mission.formula",
+        "clause odd fails whatever is flown: it looks back beyond mission time 0",
+    ),
+    (
+        [("mission", "formula"), "@odd eventually[0,5] historically[1,2] d1 in tr1"],
+        "mission.formula",
+        "clause odd holds whatever is flown",
+    ),
 ]
 
 
@@ -181,6 +211,16 @@ def test_polyhedron_without_inside(tmp_path, shape, words, place):
     document = changed(((*place, "box"), DELETE), ((*place, "polyhedron"), shape))
     found = problems(tmp_path, document)
     assert any(f == f"{place[0]}[{place[1]}].polyhedron" and words in message for f, message in found), found
+
+
+def test_more_samples_than_can_be_evaluated(tmp_path):
+    many = " and ".join(["d1 in tr1"] * 1800)
+    fine = changed((("mission", "T"), 2400.0), (("mission", "T_s"), 0.01), (("mission", "formula"), many))
+    found = problems(tmp_path, fine | {"planner": {"segment": 10.0}})
+    values = "432001800 values of predicates, and at most 400000000 are legal; choose a longer T_s"
+    assert [(field, values in message) for field, message in found] == [("mission.T_s", True)]
+    assert too_large([], 64, 3600.0, 0.05) is None
+    assert "23040064 positions, and at most 8000000 are legal" in too_large([], 64, 3600.0, 0.01)
 
 
 def test_rows_without_values(tmp_path):

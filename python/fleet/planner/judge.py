@@ -148,15 +148,12 @@ class Judge:
 
     def _too_far(self, drone: str, region: str, last: float) -> str | None:
         """Why the drone cannot be in the region by `last` [s]; None if it may be."""
-        limits = self.scenario.limits
-        shape, start = self.regions[region], self.starts[drone]
-        # Most regions are near enough: the nearest corner tells without a linear program.
-        near = float(np.abs(shape.vertices - start).max(axis=1).min())
-        if _least_time(near, limits.v_max, limits.a_max) <= last:
-            return None
         if (drone, region) not in self.needed:
-            length = _largest_step(shape, start)
-            self.needed[drone, region] = _least_time(length, limits.v_max, limits.a_max)
+            corners, start = self.regions[region].vertices, self.starts[drone]
+            limits = self.scenario.limits
+            # Into the box around a region it is no farther than into the region itself.
+            way = np.maximum(corners.min(axis=0) - start, start - corners.max(axis=0)).max()
+            self.needed[drone, region] = _least_time(max(float(way), 0.0), limits.v_max, limits.a_max)
         needs = self.needed[drone, region]
         if needs <= last + 1e-9:
             return None
@@ -259,16 +256,3 @@ def _least_time(length: float, v_max: float, a_max: float) -> float:
     """Least time [s] to pass `length` [m] along one axis from rest, at the limits."""
     ramp = length * 2 * a_max < v_max**2
     return float(np.sqrt(2 * length / a_max) if ramp else length / v_max + v_max / (2 * a_max))
-
-
-def _largest_step(shape: Region, start: Array) -> float:
-    """Least possible longest axis [m] of the way from `start` into a region: a linear program."""
-    from scipy.optimize import linprog
-
-    rows = [np.column_stack([shape.A, np.zeros(len(shape.b))])]
-    rows += [np.column_stack([sign * np.eye(3), -np.ones(3)]) for sign in (1, -1)]
-    rhs = np.concatenate([shape.b, start, -start])
-    found = linprog([0, 0, 0, 1], A_ub=np.vstack(rows), b_ub=rhs, bounds=[(None, None)] * 4)
-    if found.x is None:
-        raise RuntimeError(f"the distance to {shape.name}, a linear program, was not solved")
-    return max(float(found.x[3]), 0.0)
