@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from itertools import permutations
+from pathlib import Path
 
 import pytest
 from hypothesis import example, given, settings
@@ -15,6 +16,8 @@ from tests.unit.formulas import DRONES, formulas
 WORDS = Vocabulary(
     DRONES, ("tower", "cable"), ("tr1", "tr2"), T=60.0, T_s=0.05, delta_min=3.0, regions=("yard",)
 )
+GATED = replace(WORDS, regions=("gate",))
+README = Path(__file__).parents[2] / "README.md"
 
 
 def one(text, words=WORDS):
@@ -390,3 +393,17 @@ def test_names(name):
 @pytest.mark.parametrize("name", ["", "1d", "_d", "a-b", "a.b", "é", "z" * 33, "a\n", "a b"])
 def test_not_names(name):
     assert not is_name(name)
+
+
+def test_the_words_of_the_readme_are_those_of_the_language():
+    """Every formula of the README's table is read, with f, g and windows put in."""
+    table = re.findall(r"^\| (`.*`[^|]*) \| (.*) \|$", README.read_text(encoding="utf-8"), re.MULTILINE)
+    cells = [text for row in table for cell in row for text in re.findall(r"`([^`]*)`", cell)]
+    words = {"f": "d1 in tr1", "g": "d2 in gate", "a,b": "0,5"}
+    found = 0
+    for cell in cells:
+        text = re.sub(r"\bf\b|\bg\b|a,b", lambda m: words[m.group()], cell)
+        if " in " in text or ">=" in text or "<=" in text:
+            assert parse(f"always[0,10] ({text})" if not text.startswith("@") else text, GATED)
+            found += 1
+    assert found >= 14
