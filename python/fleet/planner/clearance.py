@@ -43,6 +43,7 @@ class Watch:
     faces: Array
     value: float = 0.0
     normals: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    last: tuple[Array, Array, Array] | None = None
 
 
 def window_cuts(times: Array, window: tuple[float, float]) -> Array:
@@ -144,13 +145,20 @@ def gilbert(points: Array) -> Array:
 
 
 def apart_margin(w: Watch, x: Array) -> tuple[Array, Array]:
-    """Margin (m,) over the threshold of each piece, and the best plane's normal (m, 3), from b to a."""
+    """Margin (m,) over the threshold of each piece, and the best plane's normal (m, 3), from b to a.
+
+    The answer for the last `x` is kept: rows are wanted where margins were.
+    """
+    if w.last is not None and np.array_equal(w.last[0], x):
+        return w.last[1], w.last[2]
     between = w.pieces[0].points(x) - w.pieces[1].points(x)
     nearest = gilbert(between)
     norm = np.linalg.norm(nearest, axis=1)
     flat = norm < 1e-6
     normals = np.where(flat[:, None], [0.0, 0.0, 1.0], nearest / np.maximum(norm, 1e-12)[:, None])
-    return np.einsum("mka,ma->mk", between, normals).min(axis=1) - w.value, normals
+    margin = np.einsum("mka,ma->mk", between, normals).min(axis=1) - w.value
+    w.last = (x.copy(), margin, normals)
+    return margin, normals
 
 
 def pair_least(w: Watch, x: Array, tube: float) -> Array:
