@@ -27,7 +27,7 @@ def publish(name: str, rows: list[dict[str, Any]]) -> None:
         table.add_column(column, justify="right")
     for row in rows:
         table.add_row(*(_cell(v) for v in row.values()))
-    Console(file=sys.stdout, width=160).print(table)
+    Console(file=sys.stdout, width=170).print(table)
     git = subprocess.run(
         ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.strip()
