@@ -11,7 +11,7 @@ from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
 from fleet.planner.algebra import TIP, Score, Symbols
-from fleet.planner.smooth import Smooth, leaves, smooth_robustness
+from fleet.planner.smooth import NEVER, Smooth, leaves, smooth_robustness
 from tests.unit.test_robustness_oracle import (
     DRONES,
     FLEET,
@@ -22,6 +22,7 @@ from tests.unit.test_robustness_oracle import (
     formulas,
     horizon,
     random_walk,
+    whole_language,
 )
 
 FACES = {name: np.array([[*a, b] for a, b in faces]) for name, faces in REGIONS.items()}
@@ -62,6 +63,19 @@ def test_log_sum_exp_is_within_log_m_by_c(f: Formula, walk: int, c: float, scale
     exact, _ = FLEET.evaluate(f, x, SAMPLE)
     error = abs(smooth(f, x, c, Score.PAPER) - exact)
     assert error <= np.log(leaves(f, FACES, SAMPLE)) / c * (1 + 1e-9) + 1e-12 * max(1.0, abs(exact))
+
+
+@seed(5)
+@settings(max_examples=200, deadline=None)
+@given(whole_language, walks, sharpness)
+def test_formulas_that_look_back_keep_both_bounds(f: Formula, walk: int, c: float) -> None:
+    x = trace(f, walk)
+    # Nothing was before sample 0: exact robustness is infinite there, smooth robustness far away.
+    exact = float(np.clip(FLEET.evaluate(f, x, SAMPLE)[0], -NEVER, NEVER))
+    rounding = 1e-12 * max(1.0, abs(exact))
+    assert smooth(f, x, c, Score.SOUND) <= exact + rounding
+    error = abs(smooth(f, x, c, Score.PAPER) - exact)
+    assert error <= np.log(leaves(f, FACES, SAMPLE)) / c * (1 + 1e-9) + rounding
 
 
 @seed(3)
