@@ -1,4 +1,4 @@
-"""Which drone visits which target, in which order: exact for small fleets.
+"""Which drone visits which target, in which order: exact for small fleets, local search for large ones.
 
 Earliest-arrival dynamic programming over subsets (Held and Karp 1962, with time windows: a drone may
 wait, so arriving earlier is never worse), then over drones: least makespan first, then least total time.
@@ -7,36 +7,15 @@ wait, so arriving earlier is never worse), then over drones: least makespan firs
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from .legs import Ints, Legs, arrive, tour_time
 
 #: Largest number of events that is assigned exactly.
 EXACT = 12
-
-
-@dataclass(frozen=True)
-class Legs:
-    """Leg times [s], infinite where a drone may not or cannot go.
-
-    `first` (d, n) start to event, `between` (d, n, n) event to event, `last` (d, n) event to home,
-    `idle` (d,) start to home; `windows` (n, 2), `dwell` (n,) stay at an event [s]; `horizon` latest return.
-    """
-
-    first: Array
-    between: Array
-    last: Array
-    idle: Array
-    windows: Array
-    dwell: Array
-    horizon: float
 
 
 def tours(legs: Legs, drone: int) -> dict[int, tuple[float, tuple[int, ...]]]:
@@ -66,12 +45,6 @@ def tours(legs: Legs, drone: int) -> dict[int, tuple[float, tuple[int, ...]]]:
     return best
 
 
-def arrive(t: float, leg: float, legs: Legs, event: int) -> float:
-    """Time [s] at which `event` is done when left for at `t`; infinite when too late."""
-    at = max(t + leg, float(legs.windows[event, 0]))
-    return at + float(legs.dwell[event]) if at <= legs.windows[event, 1] + 1e-9 else np.inf
-
-
 def partition(options: Sequence[dict[int, float]], full: int) -> list[int] | None:
     """One mask a drone, disjoint, together `full`: least maximum, then least sum; None if there is none."""
 
@@ -96,12 +69,13 @@ def partition(options: Sequence[dict[int, float]], full: int) -> list[int] | Non
     return best[1] if best else None
 
 
-def assign(legs: Legs) -> list[tuple[int, ...]] | None:
+def assign(legs: Legs, *, proved: bool = False) -> list[tuple[int, ...]] | None:
     """Events of every drone in order; None when no assignment meets the windows.
 
     Exact up to `EXACT` events. Larger problems fall into the groups of drones and events that finite
-    legs connect; each group is exact on its own (least makespan of the group) up to `EXACT` events, and
-    assigned by cheapest insertion, which may miss a feasible assignment, above that.
+    legs connect; each group is exact on its own (least makespan of the group) up to `EXACT` events. Above
+    that cheapest insertion, or a complete search where it finds nothing, is improved by local search; with
+    `proved` a complete search finds the best one, however long that takes.
     """
     drones, n = legs.first.shape
     if n <= EXACT:
@@ -118,13 +92,24 @@ def assign(legs: Legs) -> list[tuple[int, ...]] | None:
             legs.dwell[events],
             legs.horizon,
         )
-        found = exact(part) if len(events) <= EXACT else insert(part)
+        found = exact(part) if len(events) <= EXACT else large(part, proved)
         if found is None:
             return None
         for d, order in zip(who, found, strict=True):
             orders[d] = tuple(int(events[e]) for e in order)
         served += len(events)
     return orders if served == n else None
+
+
+def large(legs: Legs, proved: bool) -> list[tuple[int, ...]] | None:
+    """An assignment of more events than subsets can be listed of; None when there is none, or none found."""
+    from . import exchange, vehicles
+
+    start = insert(legs)
+    if proved:
+        return vehicles.optimal(legs, start)
+    start = start or vehicles.feasible(legs)
+    return None if start is None else exchange.improved(legs, start)
 
 
 def components(legs: Legs) -> list[tuple[Ints, Ints]]:
@@ -146,17 +131,6 @@ def exact(legs: Legs) -> list[tuple[int, ...]] | None:
     table = [tours(legs, d) for d in range(drones)]
     masks = partition([{m: t for m, (t, _) in options.items()} for options in table], (1 << n) - 1)
     return None if masks is None else [table[d][m][1] for d, m in enumerate(masks)]
-
-
-def tour_time(legs: Legs, drone: int, order: Sequence[int]) -> float:
-    """Earliest time at home [s] of one order; infinite when a window or the horizon is missed."""
-    if not order:
-        return float(legs.idle[drone])
-    t = arrive(0.0, float(legs.first[drone, order[0]]), legs, order[0])
-    for a, b in pairwise(order):
-        t = arrive(t, float(legs.between[drone, a, b]), legs, b)
-    home = t + float(legs.last[drone, order[-1]])
-    return home if home <= legs.horizon + 1e-9 else np.inf
 
 
 def insert(legs: Legs) -> list[tuple[int, ...]] | None:

@@ -14,10 +14,11 @@ import casadi as ca
 import numpy as np
 
 from fleet.planner.knots import KNOT, Array, hermite, restriction
+from fleet.planner.nlp import stage
 from fleet.planner.problem import Problem
 from fleet.planner.rows import gram
-from fleet.planner.schedule import Itinerary, survey
-from fleet.planner.stages import stage
+from fleet.planner.schedule import Itinerary
+from fleet.planner.survey import survey
 from fleet.route import follow
 
 #: Segments a leg at first, and after each refinement.

@@ -7,7 +7,8 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from fleet.assign import Legs, assign, tour_time
+from fleet.assign import assign
+from fleet.legs import Legs, tour_time
 from fleet.route import leg_time, spread
 
 

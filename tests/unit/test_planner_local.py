@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fleet.assign import EXACT, Legs, assign, components, exact, tour_time
+from fleet.assign import EXACT, assign, components, exact
 from fleet.generate import line
+from fleet.legs import Legs, tour_time
 from fleet.planner.problem import Problem, problem
-from fleet.planner.schedule import survey
+from fleet.planner.survey import survey
 from fleet.route import blocked, unblocked
 from fleet.scenario import load
 from tests.unit.test_planner_assign import random_legs

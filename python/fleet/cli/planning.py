@@ -30,6 +30,7 @@ PLAN_KEYS = (
 """Keys that `plan --json` adds (design.md, --json)."""
 ENERGY = ("lexicographic", "weighted")
 METHODS = ("auto", "convex", "nlp", "paper", "rrt")
+ASSIGNMENTS = ("auto", "exact", "paper")
 ScenarioArgument = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (.toml).")]
 
 
@@ -53,6 +54,13 @@ def plan(
             "paper (log-sum-exp over samples, IPOPT; minutes)."
         ),
     ] = "auto",
+    assignment: Annotated[
+        str | None,
+        typer.Option(
+            help="Who visits what: auto, exact (the proved best, however long it takes) or paper (targets "
+            "dealt in turn); orders in the scenario go first. As \\[planner] says if not given."
+        ),
+    ] = None,
     energy: Annotated[
         str | None,
         typer.Option(
@@ -87,7 +95,7 @@ def plan(
     """
     interrupt = Interrupt()
     with interrupt.installed(), reply("plan", as_json=as_json, keys=PLAN_KEYS) as answer:
-        loaded = saving(files.read_scenario(scenario), energy, floor)
+        loaded = assigning(saving(files.read_scenario(scenario), energy, floor), assignment)
         answer.scenario, answer.seed = loaded.name, loaded.mission.seed
         if not as_json:
             show.formula(answer, loaded.clauses())
@@ -102,6 +110,21 @@ def plan(
             show.plan(answer, result.plan, answer.fields)
             for gave in result.relaxed:
                 answer.say(f"gave way: {gave}")
+
+
+def assigning(scenario: Scenario, assignment: str | None) -> Scenario:
+    """The scenario with the assignment that the option asks for.
+
+    Raises InputError when it is not legal.
+    """
+    from dataclasses import replace
+
+    if assignment is None:
+        return scenario
+    if assignment not in ASSIGNMENTS:
+        legal = ", ".join(ASSIGNMENTS)
+        raise bad_input("value", f"{assignment!r} is not legal; must be {legal}", field="--assignment")
+    return replace(scenario, planner=scenario.planner.model_copy(update={"assignment": assignment}))
 
 
 def saving(scenario: Scenario, energy: str | None, floor: float | None) -> Scenario:

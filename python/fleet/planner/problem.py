@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,9 @@ class Problem:
     `headings` required heading per target [rad],
     `segment` longest segment [s], `c` sharpness of smooth robustness [1/m], `max_iterations` and
     `tolerance` those of the nonlinear program, `given` hand-made orders of targets, or None, `weights` of
-    clauses by id, the heaviest 1 (weights.py), `excused` clauses that a plan may violate (relax.py).
+    clauses by id, the heaviest 1 (weights.py), `excused` clauses that a plan may violate (relax.py),
+    `split` drone of each target where the paper's split is asked for, `proved` whether the assignment must be
+    the proved best.
     """
 
     ids: tuple[str, ...]
@@ -54,6 +56,8 @@ class Problem:
     given: Mapping[str, tuple[str, ...]] | None
     weights: Mapping[str, float]
     excused: frozenset[str] = frozenset()
+    split: Mapping[str, str] = field(default_factory=dict)
+    proved: bool = False
 
     def number(self, drone: str) -> int:
         """Index of a drone."""
@@ -118,4 +122,16 @@ def problem(scenario: Scenario) -> Problem:
         tolerance=float(scenario.planner.tolerance),
         given=None if given is None else {d: tuple(order) for d, order in given.items()},
         weights=shares(scenario.clauses()),
+        split=balanced(scenario) if scenario.planner.assignment == "paper" else {},
+        proved=scenario.planner.assignment == "exact",
     )
+
+
+def balanced(scenario: Scenario) -> dict[str, str]:
+    """The paper's split: targets dealt to the drones in turn.
+
+    Its inspection formula (section on the power tower) gives tr1 and tr3 to one cluster of drones, tr2 and
+    tr4 to the other, and asks for a balance only.
+    """
+    ids = [d.id for d in scenario.drones]
+    return {target.name: ids[k % len(ids)] for k, target in enumerate(scenario.targets)}

@@ -13,8 +13,9 @@ from itertools import combinations
 
 import numpy as np
 
-from fleet.assign import EXACT, Legs, assign, tour_time
+from fleet.assign import EXACT, assign
 from fleet.errors import Need
+from fleet.legs import Legs, tour_time
 from fleet.route import leg_time, turn_time
 
 from .knots import Array

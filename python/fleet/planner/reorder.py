@@ -8,12 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from fleet.assign import EXACT, Legs
+from fleet.assign import EXACT
+from fleet.legs import Legs
 from fleet.route import leg_time, reach
 
 from .knots import Array
 from .problem import Problem
-from .schedule import EASE, Itinerary, Map, event_times, itinerary, leg_times, survey
+from .schedule import EASE, Itinerary, event_times, itinerary, leg_times
+from .survey import Map, survey
 
 Orders = tuple[tuple[int, ...], ...]
 

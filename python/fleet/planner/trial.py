@@ -17,12 +17,13 @@ from .problem import Problem
 from .progress import Progress, silent
 from .reach import Reach, needs
 from .result import trajectory
-from .schedule import Itinerary, leg_times, schedules, survey
+from .schedule import Itinerary, leg_times, schedules
 from .setup import Setup, warm_start
 from .shortfall import shortfalls
 from .sketch import sketched
 from .spec import Invariant
 from .subset import subset
+from .survey import survey
 
 #: Margin above the tube at which a trial is content [m].
 CONTENT = 0.02

@@ -58,11 +58,16 @@ class Replan(Table):
 
 
 class Planner(Table):
-    """`[planner]`: longest polynomial segment [s]; iterations and tolerance of the solver (paper, sec. V)."""
+    """`[planner]`: longest polynomial segment [s]; iterations and tolerance of the solver (paper, sec. V).
+
+    `assignment` says who visits what: "auto", "exact" (proved best, however large the fleet) or "paper"
+    (target k to drone k modulo the fleet). Orders of `[assignment]` go before it.
+    """
 
     segment: float = Field(1.0, ge=0.05, le=10)
     max_iterations: int = Field(2000, ge=1, le=100_000)
     tolerance: float = Field(1e-4, gt=0, le=0.1)
+    assignment: Literal["auto", "exact", "paper"] = "auto"
 
 
 class Energy(Table):
