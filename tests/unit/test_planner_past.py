@@ -7,11 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fleet import _core
 from fleet.errors import InfeasibleError
+from fleet.log import read
 from fleet.planner import plan
 from fleet.planner.problem import problem
 from fleet.planner.spec import specification
+from fleet.report.figures import robustness
 from fleet.scenario import Scenario, load
+from fleet.verdict import judge
+from tests.unit.synthetic import write_flight
 from tests.unit.test_planner_rest import mission, planned, sampled
 
 REGIONS = """
@@ -107,8 +112,6 @@ def test_the_certificate_is_the_robustness_of_the_flight(tmp_path: Path) -> None
     times = np.arange(0.0, 60.0 + 1e-9, 0.05)
 
     def depth(drone: str, region: str) -> np.ndarray:
-        from fleet import _core
-
         knots = next(d["trajectory"] for d in content["drones"] if d["id"] == drone)
         shape = next(r["shape"] for r in content["regions"] if r["name"] == region)
         return _core.inside(
@@ -119,3 +122,23 @@ def test_the_certificate_is_the_robustness_of_the_flight(tmp_path: Path) -> None
     once = np.array([met[max(0, k - 400) : k + 1].max() for k in range(len(times))])
     rho = next(c["result"]["rho"] for c in content["clauses"] if c["id"] == "first")
     assert np.maximum(-asked, once).min() == pytest.approx(rho, abs=1e-9)
+
+
+def test_a_flight_is_judged_by_past_operators(tmp_path: Path) -> None:
+    """The plan flown keeps them; d2 blown 3 m aside as it visits tr2 has not been there before d1."""
+    clauses = ("@t1 eventually[20,40] d1 in tr1", "@first always[0,T] (d1 in tr1 -> once[0,20] d2 in tr2)")
+    result = planned(mission(tmp_path, *clauses))
+    flight = read(write_flight(result.data, tmp_path))
+    verdict = judge(flight)
+    assert verdict.satisfied, verdict.problems
+    flown = {c.id: c.rho_flown for c in verdict.clauses}
+    assert flown["first"] == pytest.approx(
+        next(c["result"]["rho"] for c in result.plan["clauses"] if c["id"] == "first"), abs=0.02
+    )
+    assert len(robustness(flight).data) == len(result.plan["clauses"])
+    blown = tmp_path / "blown"
+    blown.mkdir()
+    aside = np.array([3.0, 0.0, 0.0])
+    flight = read(write_flight(result.data, blown, lambda drone, t: aside if drone == "d2" else 0 * aside))
+    wrong = {c.id for c in judge(flight).clauses if (c.rho_flown or 0.0) <= 0}
+    assert "first" in wrong

@@ -110,7 +110,10 @@ def _tree(text: str) -> Node:
         message = f"unexpected character {error.char!r}"
         raise FormulaError(message, text, error.line, error.column) from None
     except UnexpectedToken as error:
-        expected = ", ".join(sorted(_display(name) for name in error.accepts or error.expected))
+        legal = set(error.accepts or error.expected)
+        if "NAME" in legal and "NOT" not in legal:
+            legal -= _NAMES_TOO
+        expected = ", ".join(sorted(map(_display, legal)))
         if error.token.type == "$END":
             lines = text.rstrip().splitlines() or [""]
             raise FormulaError(
@@ -119,6 +122,10 @@ def _tree(text: str) -> Node:
         raise FormulaError(
             f"unexpected '{error.token}'; expected {expected}", text, error.line, error.column
         ) from None
+
+
+_NAMES_TOO = {"ONCE", "HISTORICALLY", "SINCE", "STAY"}
+"""Words that may also name a clause."""
 
 
 def _display(terminal: str) -> str:
