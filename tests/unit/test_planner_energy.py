@@ -110,6 +110,26 @@ def test_saving_past_a_peer_keeps_the_tube_and_repeats_itself() -> None:
     assert one.energy <= basic.energy
 
 
+def test_saving_keeps_clauses_without_a_normal_form(scenario: Scenario, tmp_path: Path) -> None:
+    """An order by `until` and a meeting are proved for the plan that saves, too."""
+    formula = """
+@safe always[0,T] all d: d in workspace and d outside obstacles
+@order (not d1 in tr1) until[0,2T/3] d2 in tr2
+@tr1 eventually[0,2T/3] d1 in tr1
+@meet eventually[0,2T/3] (d1 in tr3 and d2 in tr4)
+@home eventually[2T/3,T] all d: d in home
+"""
+    text = (SCENARIOS / f"{scenario.name}.toml").read_text()
+    path = tmp_path / "ordered.toml"
+    path.write_text(text.replace("seed = 1\n", f'seed = 1\nformula = """{formula}"""\n', 1))
+    ordered = load(path)
+    found, without = plan(ordered), plan(replace(ordered, energy=None))
+    assert certificate.verify(found.bytes).ok
+    assert found.rho_lower >= 0.3
+    assert found.int_a2 < 0.7 * without.int_a2
+    assert found.energy <= without.energy
+
+
 def test_slope_of_electrical_energy_is_that_of_the_core() -> None:
     task = problem(load(SCENARIOS / "power_tower.toml"))
     stage = setup(task, itineraries(task, 1.0)[0][0], 1.0)

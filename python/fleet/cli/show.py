@@ -84,9 +84,9 @@ def verdict(answer: Reply, plan: Mapping[str, Any], verdict: Verdict) -> None:
 
 def _energies(fields: Mapping[str, Any]) -> str:
     """Electrical energy of a plan: fleet, then drone by drone, with the share that hovering would take."""
-    fleet = f"{fields['energy_J'] / 1e3:.2f} kJ (hovering {100 * fields['hover_share']:.1f} %)"
+    fleet = f"{fields['energy_J'] / 1e3:.3f} kJ (hovering {100 * fields['hover_share']:.2f} %)"
     each = [
-        f"{d['id']} {d['energy_J'] / 1e3:.2f} kJ ({100 * d['hover_share']:.1f} %)" for d in fields["drones"]
+        f"{d['id']} {d['energy_J'] / 1e3:.3f} kJ ({100 * d['hover_share']:.2f} %)" for d in fields["drones"]
     ]
     return f"{fleet}: {', '.join(each)}" if len(each) > 1 else fleet
 

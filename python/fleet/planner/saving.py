@@ -57,37 +57,48 @@ def frugal(scenario: Scenario, found: PlanResult, goal: Energy, tell: Progress) 
     """
     mark = time.perf_counter()
     task = problem(scenario)
-    forward = itineraries(task, wanted(task))[0][0]
     best, least = found, cost(goal, task, found)
-    known: list[tuple[Itinerary, groups.Flight]] = []
-    for way in directions(task, forward, known):
-        saving = saver(goal, found.energies)
-        flight = groups.fly(task, way, wanted(task), groups.steps, tell, saving)
-        known.append((way, flight))
-        tell("certify", flight.margins.r)
-        try:
-            refuse(task, flight.margins)
-            out = result(
-                scenario,
-                task,
-                flight.way,
-                flight.tracks,
-                bound=found.rho_bound,
-                method=found.method,
-                int_a2=flight.int_a2,
-                timings=found.timings,
-            )
-            refuse_broken(out)
-        except InfeasibleError:
-            continue  # the other direction may do, and `found` does
-        worth = cost(goal, task, out)
-        if worth < least and out.energy <= found.energy:
-            best, least = out, worth
+    for forward in itineraries(task, wanted(task))[0]:
+        known: list[tuple[Itinerary, groups.Flight]] = []
+        certified: list[PlanResult] = []
+        for way in directions(task, forward, known):
+            flight = groups.fly(task, way, wanted(task), groups.steps, tell, saver(goal, found.energies))
+            known.append((way, flight))
+            try:
+                certified.append(proved(scenario, task, flight, found, tell))
+            except InfeasibleError:
+                continue  # another direction may do, and `found` does
+        for out in certified:
+            worth = cost(goal, task, out)
+            if worth < least and out.energy <= found.energy:
+                best, least = out, worth
+        if certified:
+            break  # further itineraries are for missions that this one cannot keep
     if best is found:
         return found
     spent = dict(found.timings)
     spent["solve"] += time.perf_counter() - mark
     return replace(best, timings=spent)
+
+
+def proved(
+    scenario: Scenario, task: Problem, flight: groups.Flight, found: PlanResult, tell: Progress
+) -> PlanResult:
+    """The certified plan of a flight; InfeasibleError where it breaks limits, margins or a clause."""
+    refuse(task, flight.margins)
+    tell("certify", flight.margins.r)
+    out = result(
+        scenario,
+        task,
+        flight.way,
+        flight.tracks,
+        bound=found.rho_bound,
+        method=found.method,
+        int_a2=flight.int_a2,
+        timings=found.timings,
+    )
+    refuse_broken(out)
+    return out
 
 
 def cost(goal: Energy, task: Problem, found: PlanResult) -> float:
