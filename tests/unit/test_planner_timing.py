@@ -262,3 +262,19 @@ def test_moved_visits_keep_dwell_heading_and_windows(seed: int, tmp_path: Path) 
     assert last.margins.r >= hold - 1e-3
     assert last.margins.share <= 1
     assert squared_acceleration(last.stage.grid, last.x) <= squared_acceleration(then.grid, y) + 1e-9
+
+
+def test_visits_move_away_from_windows_of_other_clauses(tmp_path: Path) -> None:
+    """Half of the way is shut until a second before the even visit time: too late to be there in time."""
+    visits = [((10.0, 0.0, 1.2), "eventually[0,16] {}", None)]
+    task = problem(alone(tmp_path, 16.0, visits, "@shut always[0,7] d1.x <= 5"))
+    way = next(iter(schedules(task, 1.0)))
+    stage = setup(task, way, 1.0)
+    x, margins, _ = convex.optimise(stage)
+    assert way.stops[0][0].t == pytest.approx(8.0, abs=0.1)
+    assert margins.r < 0.7
+    then, _, after = raised(stage, x, margins)
+    assert after.share <= 1
+    assert after.r > 0.99
+    assert kept(task, way, then.itinerary)
+    assert 8.3 < then.itinerary.stops[0][0].t < 12.0
