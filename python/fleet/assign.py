@@ -51,11 +51,12 @@ def partition(options: Sequence[dict[int, float]], full: int) -> list[int] | Non
     def solve(join: Callable[[float, float], float], cap: float) -> tuple[float, list[int]] | None:
         table: dict[int, tuple[float, list[int]]] = {0: (0.0, [])}
         for option in options:
+            legal = [(mask, time) for mask, time in option.items() if time <= cap]
+            masks = np.array([mask for mask, _ in legal], dtype=np.int64)
             grown: dict[int, tuple[float, list[int]]] = {}
             for used, (cost, chosen) in table.items():
-                for mask, time in option.items():
-                    if mask & used or time > cap:
-                        continue
+                for k in np.flatnonzero(masks & used == 0).tolist():
+                    mask, time = legal[k]
                     total = join(cost, time)
                     if total < grown.get(used | mask, (np.inf, []))[0] - 1e-9:
                         grown[used | mask] = (total, [*chosen, mask])

@@ -65,12 +65,37 @@ class Geometry:
 
     def barred(self, drone: str, region: str, window: tuple[float, float]) -> Invariant | None:
         """An invariant that keeps the drone out of the region, by the tube, all through the window [s]."""
-        for inv in self.invariants[drone]:
-            if inv.window[0] > window[0] + 1e-9 or inv.window[1] < window[1] - 1e-9:
-                continue
-            if len(self.corners[region]) and not self.admits(inv, region):
-                return inv
-        return None
+        if len(self.corners[region]) == 0:
+            return None
+        # Drones of a fleet mostly have the same invariants: each set of them is looked at once.
+        key = (self.alike[drone], region, window)
+        if key not in self.first_barring:
+            self.first_barring[key] = next(
+                (
+                    k
+                    for k, inv in enumerate(self.invariants[drone])
+                    if inv.window[0] <= window[0] + 1e-9
+                    and inv.window[1] >= window[1] - 1e-9
+                    and not self.admits(inv, region)
+                ),
+                None,
+            )
+        found = self.first_barring[key]
+        return None if found is None else self.invariants[drone][found]
+
+    @cached_property
+    def alike(self) -> dict[str, int]:
+        """A number for every drone, the same for those with the same invariants."""
+        numbers: dict[tuple[object, ...], int] = {}
+        return {
+            d: numbers.setdefault(tuple((i.kind, i.region, i.row, i.window) for i in mine), len(numbers))
+            for d, mine in self.invariants.items()
+        }
+
+    @cached_property
+    def first_barring(self) -> dict[tuple[int, str, tuple[float, float]], int | None]:
+        """Answers of `barred` so far, as places in the invariants of a drone."""
+        return {}
 
     def admits(self, inv: Invariant, region: str) -> bool:
         """Whether some point of the region, the tube's margin inside, keeps the invariant by the tube."""
