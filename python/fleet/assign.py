@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .legs import Ints, Legs, arrive, tour_time
+from .legs import Ints, Legs, Tour, extended, tour_time
 
 #: Largest number of events that is assigned exactly.
 EXACT = 12
@@ -21,26 +21,21 @@ EXACT = 12
 def tours(legs: Legs, drone: int) -> dict[int, tuple[float, tuple[int, ...]]]:
     """For every set of events (bit mask) that `drone` can serve: earliest time at home [s] and the order."""
     n = legs.first.shape[1]
-    state: dict[tuple[int, int], tuple[float, tuple[int, ...]]] = {}
-    for e in range(n):
-        t = arrive(0.0, float(legs.first[drone, e]), legs, e)
-        if np.isfinite(t):
-            state[1 << e, e] = (t, (e,))
     best: dict[int, tuple[float, tuple[int, ...]]] = {0: (float(legs.idle[drone]), ())}
-    layer = dict(state)
+    layer: dict[tuple[int, int, int], Tour] = {(0, -1, -1): Tour(0.0)}
     while layer:
-        grown: dict[tuple[int, int], tuple[float, tuple[int, ...]]] = {}
-        for (mask, at), (t, order) in layer.items():
-            home = t + float(legs.last[drone, at])
+        grown: dict[tuple[int, int, int], Tour] = {}
+        for (mask, at, _), tour in layer.items():
+            home = tour.t + float(legs.last[drone, at]) if mask else np.inf
             if home <= legs.horizon + 1e-9 and home < best.get(mask, (np.inf, ()))[0] - 1e-9:
-                best[mask] = (home, order)
+                best[mask] = (home, tour.order)
             for e in range(n):
                 if mask >> e & 1:
                     continue
-                then = arrive(t, float(legs.between[drone, at, e]), legs, e)
-                key = (mask | 1 << e, e)
-                if then < grown.get(key, (np.inf, ()))[0] - 1e-9:
-                    grown[key] = (then, (*order, e))
+                then = extended(tour, legs, drone, e)
+                key = (mask | 1 << e, e, then.facing)
+                if then.t < (grown[key].t if key in grown else np.inf) - 1e-9:
+                    grown[key] = then
         layer = grown
     return best
 
@@ -92,6 +87,7 @@ def assign(legs: Legs, *, proved: bool = False) -> list[tuple[int, ...]] | None:
             legs.windows[events],
             legs.dwell[events],
             legs.horizon,
+            None if legs.turn is None else legs.turn[np.ix_(who, [*events, n], events)],
         )
         found = exact(part) if len(events) <= EXACT else large(part, proved)
         if found is None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,8 @@ class Legs:
 
     `first` (d, n) start to event, `between` (d, n, n) event to event, `last` (d, n) event to home,
     `idle` (d,) start to home; `windows` (n, 2), `dwell` (n,) stay at an event [s]; `horizon` latest return.
+    `turn` (d, n + 1, n) time that turning takes from the heading of an event, or in the last row of the
+    start, to that of an event, whatever comes between; nan where the event has no heading; None without any.
     """
 
     first: Array
@@ -28,6 +29,32 @@ class Legs:
     windows: Array
     dwell: Array
     horizon: float
+    turn: Array | None = None
+
+    def turning(self, drone: int, facing: int, event: int) -> float | None:
+        """Time to turn from the heading of event `facing` (-1 the start) to that of `event`; None without."""
+        time = np.nan if self.turn is None else float(self.turn[drone, facing, event])
+        return None if np.isnan(time) else time
+
+
+@dataclass(frozen=True)
+class Tour:
+    """A tour so far: done at `t`, looking as event `facing` (-1 the start) wants since `since` [s]."""
+
+    t: float
+    order: tuple[int, ...] = ()
+    facing: int = -1
+    since: float = 0.0
+
+
+def extended(tour: Tour, legs: Legs, drone: int, event: int) -> Tour:
+    """A tour with one more event; its time is infinite when that comes too late."""
+    before = tour.order[-1] if tour.order else -1
+    leg = float(legs.first[drone, event] if before < 0 else legs.between[drone, before, event])
+    turn = legs.turning(drone, tour.facing, event)
+    done = arrive(max(tour.t + leg, tour.since + (turn or 0.0)), 0.0, legs, event)
+    facing, since = (tour.facing, tour.since) if turn is None else (event, done)
+    return Tour(done, (*tour.order, event), facing, since)
 
 
 def arrive(t: float, leg: float, legs: Legs, event: int) -> float:
@@ -40,8 +67,8 @@ def tour_time(legs: Legs, drone: int, order: Sequence[int]) -> float:
     """Earliest time at home [s] of one order; infinite when a window or the horizon is missed."""
     if not order:
         return float(legs.idle[drone])
-    t = arrive(0.0, float(legs.first[drone, order[0]]), legs, order[0])
-    for a, b in pairwise(order):
-        t = arrive(t, float(legs.between[drone, a, b]), legs, b)
-    home = t + float(legs.last[drone, order[-1]])
+    tour = Tour(0.0)
+    for e in order:
+        tour = extended(tour, legs, drone, e)
+    home = tour.t + float(legs.last[drone, order[-1]])
     return home if home <= legs.horizon + 1e-9 else np.inf

@@ -10,8 +10,9 @@ from fleet.route import turn_time
 
 from .knots import SAME_KNOT, Array, Ints
 from .problem import Problem
-from .schedule import Itinerary, shortest_turn
+from .schedule import Itinerary
 from .setup import marks
+from .turns import shortest_turn
 
 #: Least time between two visits of a drone [s], and between a visit and the end of a window of an
 #: invariant unless they coincide: the wire's shortest segment is 0.05 s.

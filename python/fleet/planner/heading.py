@@ -9,7 +9,8 @@ from fleet.route import turn_time
 
 from .knots import Array
 from .problem import Problem
-from .schedule import Itinerary, shortest_turn
+from .schedule import Itinerary
+from .turns import shortest_turn
 
 
 def headings(problem: Problem, itinerary: Itinerary, drone: int, times: Array) -> Array:

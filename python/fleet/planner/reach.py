@@ -19,10 +19,11 @@ from fleet.legs import Legs, tour_time
 from fleet.route import leg_time, turn_time
 
 from .knots import Array
+from .leg_times import permitted
 from .necessary import Geometry, gatherings
 from .problem import Problem
-from .schedule import permitted, shortest_turn
 from .spec import Visit
+from .turns import shortest_turn
 
 #: Largest sets of visits that are looked at one by one, so that the smallest is found.
 LOOKED_AT = 3

@@ -13,8 +13,9 @@ from fleet.legs import Legs
 from fleet.route import leg_time, reach
 
 from .knots import Array
+from .leg_times import leg_times
 from .problem import Problem
-from .schedule import EASE, Itinerary, event_times, itinerary, leg_times
+from .schedule import EASE, Itinerary, event_times, itinerary
 from .survey import Map, survey
 
 Orders = tuple[tuple[int, ...], ...]

@@ -23,8 +23,9 @@ from .forbidden import INSTANT, Connections, forbidden
 from .knots import KNOT, Array, Grid
 from .problem import Problem
 from .rounding import FASTER, LIMIT, Cubics
-from .schedule import Itinerary, Stop, shortest_turn
+from .schedule import Itinerary, Stop
 from .tree import Leg, grow
+from .turns import shortest_turn
 
 #: Samples of a leg, and the most while there is no way yet.
 SAMPLES, PATIENCE = 1000, 4000

@@ -11,12 +11,14 @@ import numpy as np
 from fleet.assign import EXACT, assign
 from fleet.errors import InfeasibleError
 from fleet.legs import Legs
-from fleet.route import leg_time, reach, spread, turn_time
+from fleet.route import spread
 
 from .knots import Array
+from .leg_times import leg_times
 from .problem import Problem
 from .spec import Visit
 from .survey import Map, survey
+from .turns import least_legs
 
 #: Factors on rest-to-rest leg times, tried in turn: room for smooth flight first.
 EASE = (1.4, 1.15, 1.0)
@@ -42,64 +44,6 @@ class Itinerary:
     paths: tuple[tuple[Array, ...], ...]
 
 
-def heading_at(problem: Problem, name: str, drone: int) -> float | None:
-    """Heading required at a place [rad], if any; at the start the pad's."""
-    return float(problem.psi[drone]) if name.startswith("start of ") else problem.headings.get(name)
-
-
-def place_times(problem: Problem, world: Map, ease: float | None) -> Array:
-    """Least time [s] from place i to j: flight and turn; `ease` None flies through at v_max.
-
-    Infinite where there is no way. Numbers of the first places are those of the drones that start there.
-    """
-    out = np.full((len(world.points), len(world.points)), np.inf)
-    headings = [heading_at(problem, name, k) for k, name in enumerate(world.names)]
-    for (i, j), path in world.ways.paths.items():
-        flight = leg_time(reach(path), problem.v_max, problem.a_max, rest=ease is not None) * (ease or 1.0)
-        a, b = headings[i], headings[j]
-        turn = 0.0 if a is None or b is None else turn_time(shortest_turn(a, b), problem.heading_rate)
-        out[i, j] = max(flight, turn)
-    return out
-
-
-def shortest_turn(a: float, b: float) -> float:
-    """Angle [rad] from heading a to b the short way, in (-pi, pi]; half turns go counter-clockwise."""
-    turn = (b - a) % (2 * np.pi)
-    return float(turn - 2 * np.pi if turn > np.pi + 1e-9 else turn)
-
-
-def leg_times(problem: Problem, world: Map, ease: float | None) -> Legs:
-    """All leg times of the assignment; hand-made assignments forbid the other drones."""
-    visits = problem.spec.visits
-    drones, n = len(problem.ids), len(visits)
-    first, last = np.full((drones, n), np.inf), np.full((drones, n), np.inf)
-    middle = np.full((drones, n, n), np.inf)
-    times = place_times(problem, world, ease)
-    for d in range(drones):
-        places = np.array(world.place[d], dtype=int)
-        mine = np.array([e for e in range(n) if places[e] >= 0 and permitted(problem, d, visits[e])], int)
-        there = np.flatnonzero(places >= 0)
-        first[d, mine] = times[world.start[d], places[mine]]
-        last[d, mine] = times[places[mine], world.home[d]]
-        middle[d][np.ix_(mine, there)] = times[np.ix_(places[mine], places[there])]
-        middle[d, mine, mine] = np.inf
-    idle = times[list(world.start), list(world.home)]
-    windows = np.array([v.window for v in visits], dtype=float).reshape(n, 2)
-    dwell = np.array([v.dwell for v in visits])
-    return Legs(first, middle, last, idle, windows, dwell, problem.horizon)
-
-
-def permitted(problem: Problem, drone: int, visit: Visit) -> bool:
-    """Whether a hand-made assignment, and then the paper's split, leave this visit to this drone."""
-    name = problem.ids[drone]
-    region = next((r for d, r in visit.options if d == name), None)
-    given = problem.given or {}
-    if any(region in order for order in given.values()):
-        return region in given.get(name, ())
-    owner = None if region is None else problem.split.get(region)
-    return owner in (None, name) or not any(d == owner for d, _ in visit.options)
-
-
 def by_hand(problem: Problem, orders: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
     """Orders of visits with the hand-made order of targets put in where there is one."""
     if problem.given is None:
@@ -117,8 +61,8 @@ def schedules(problem: Problem, bound: float) -> Iterator[Itinerary]:
     """Itineraries to start from, routed at a clearance of up to `bound` [m], in order of preference.
 
     The first spreads the slack evenly; then come visits as early and as late as can be, for invariants
-    that hold over a part of the mission only. Raises InfeasibleError, naming the clause, when even
-    flight through at v_max misses a window.
+    that hold over a part of the mission only, and then those of faster legs. Raises InfeasibleError,
+    naming the clause, when even flight through at v_max misses a window.
     """
     problem = replace(problem, obstacles=problem.walls())
     if len(problem.spec.visits) > EXACT:
@@ -148,7 +92,8 @@ def asked_for(problem: Problem) -> tuple[str, ...]:
 
 def timed_itineraries(problem: Problem, world: Map) -> Iterator[Itinerary]:
     """The itineraries of `schedules` over the ways of `world`; none when a window would be missed."""
-    for ease in (*EASE, None):
+    known: list[tuple[object, ...]] = []
+    for ease in (*EASE, "through", "edges", None):
         legs = leg_times(problem, world, ease)
         orders = assign(legs, proved=problem.proved)
         if orders is None:
@@ -156,47 +101,47 @@ def timed_itineraries(problem: Problem, world: Map) -> Iterator[Itinerary]:
         orders = by_hand(problem, orders)
         timed = [event_times(problem, legs, d, order) for d, order in enumerate(orders)]
         times = [t for t in timed if t is not None]
-        if len(times) == len(timed):
+        if len(times) < len(timed):
+            continue
+        mark = (*map(tuple, orders), *map(tuple, times))
+        if mark not in known:
             yield itinerary(problem, world, orders, times)
-            for late in (False, True):
-                shifted = [extreme_times(problem, legs, d, order, late) for d, order in enumerate(orders)]
-                yield itinerary(problem, world, orders, shifted)
-            return
+        for late in (False, True) if not known else ():
+            shifted = [extreme_times(problem, legs, d, order, late) for d, order in enumerate(orders)]
+            yield itinerary(problem, world, orders, shifted)
+        known.append(mark)
 
 
 def event_times(problem: Problem, legs: Legs, drone: int, order: tuple[int, ...]) -> Array | None:
     """Times of one drone's visits with the slack spread over its legs, or None."""
     if not order:
         return np.zeros(0)
-    least = [legs.first[drone, order[0]]]
-    least += [legs.between[drone, a, b] + legs.dwell[a] for a, b in pairwise(order)]
-    least.append(legs.last[drone, order[-1]] + legs.dwell[order[-1]])
+    least = least_legs(legs, drone, order, problem.sample)
     windows = legs.windows[list(order)]
     # A visit at the very end of its window would be missed by a drone that lags: keep off it if possible.
     spared = np.maximum(windows[:, 1] - SPARE * problem.horizon, windows[:, 0])
     early = np.column_stack([windows[:, 0], spared])
-    times = spread(np.array(least), early, problem.horizon, problem.sample)
-    return times if times is not None else spread(np.array(least), windows, problem.horizon, problem.sample)
+    times = spread(least, early, problem.horizon, problem.sample)
+    return times if times is not None else spread(least, windows, problem.horizon, problem.sample)
 
 
 def extreme_times(problem: Problem, legs: Legs, drone: int, order: tuple[int, ...], late: bool) -> Array:
     """Times of one drone's visits, all as early or as late as legs and windows allow; multiples of T_s."""
     out = np.zeros(len(order))
+    if not order:
+        return out
+    least = least_legs(legs, drone, order, problem.sample)
     if late:
         clock = problem.horizon
-        legs_after = [*(legs.between[drone, a, b] for a, b in pairwise(order)), *legs.last[drone, order[-1:]]]
         for k in reversed(range(len(order))):
-            e = order[k]
-            clock = min(clock - legs_after[k] - legs.dwell[e], legs.windows[e, 1])
+            clock = min(clock - least[k + 1], legs.windows[order[k], 1])
             out[k] = np.floor(clock / problem.sample + 1e-6) * problem.sample
         return out
-    clock, before = 0.0, -1
+    clock = 0.0
     for k, e in enumerate(order):
-        clock += legs.first[drone, e] if before < 0 else legs.between[drone, before, e]
-        clock = max(clock, legs.windows[e, 0])
-        out[k] = np.ceil(clock / problem.sample - 1e-6) * problem.sample
-        clock, before = out[k] + legs.dwell[e], e
-    return np.minimum(out, legs.windows[list(order), 1]) if order else out
+        clock = max(clock + least[k], legs.windows[e, 0])
+        out[k] = clock = np.ceil(clock / problem.sample - 1e-6) * problem.sample
+    return np.minimum(out, legs.windows[list(order), 1])
 
 
 def itinerary(problem: Problem, world: Map, orders: list[tuple[int, ...]], times: list[Array]) -> Itinerary:

@@ -13,11 +13,12 @@ from fleet.errors import InfeasibleError, Need
 from . import convex, groups
 from .ceiling import rho_bound
 from .knots import Array
+from .leg_times import leg_times
 from .problem import Problem
 from .progress import Progress, silent
 from .reach import Reach, needs
 from .result import trajectory
-from .schedule import Itinerary, leg_times, schedules
+from .schedule import Itinerary, schedules
 from .setup import Setup, warm_start
 from .shortfall import shortfalls
 from .sketch import sketched
