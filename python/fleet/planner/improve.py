@@ -7,7 +7,7 @@ orders of visits, the nonlinear program, finer segments; then the same at random
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -62,9 +62,10 @@ class Certified:
 
 @dataclass
 class Lead:
-    """The best plan so far, if there is one."""
+    """The best plan so far, if there is one, and all attempts that were flown with what they reached."""
 
     best: Certified | None = None
+    tried: list[tuple[Attempt, convex.Margins]] = field(default_factory=list)
 
 
 def improvements(

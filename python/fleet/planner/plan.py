@@ -10,6 +10,7 @@ from fleet.assign import EXACT
 from fleet.errors import InfeasibleError, InputError
 
 from . import convex, groups
+from .attempts import METHODS, attempts
 from .baseline import BASELINES
 from .ceiling import rho_bound, slack_bound
 from .conflict import Court
@@ -20,14 +21,11 @@ from .relax import relaxed
 from .result import PlanResult, result
 from .schedule import Itinerary, schedules
 from .sketch import sketched
-from .timing import raised
 from .watch import Watch
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
 
-#: Planning methods by name.
-METHODS: dict[str, groups.Method] = {"convex": groups.steps, "nlp": groups.nonlinear}
 #: Clearance that is worth while when no clause bounds rho [m].
 WIDEST = 5.0
 #: Share of energy whose saving makes a plan a better one.
@@ -111,7 +109,7 @@ def search(court: Court, tell: Progress, method: str, watch: Watch, *, further: 
     seed = scenario.mission.seed if further else None
     for one in tries(task, ways, wanted(task), method, lead, seed):
         try:
-            found = attempt(scenario, one, bound, watch, tell)
+            found = attempt(scenario, one, bound, watch, tell, lead)
         except InfeasibleError as error:
             refusal = refusal or error
             if lead.best is None:
@@ -160,7 +158,7 @@ def tries(
     task: Problem, ways: list[Itinerary], bound: float, method: str, lead: Lead, seed: int | None
 ) -> Iterator[Attempt]:
     """The attempts of `plan` until one leads, then with a `seed` those that may beat it."""
-    for one in attempts(task, ways, method):
+    for one in attempts(task, ways, method, lead):
         yield one
         if lead.best is not None:
             break
@@ -207,23 +205,17 @@ def itineraries(task: Problem, bound: float) -> tuple[list[Itinerary], Infeasibl
         return list(schedules(task, bound)), error
 
 
-def attempts(task: Problem, ways: list[Itinerary], method: str) -> Iterator[Attempt]:
-    """Itineraries and methods in the order in which they are tried."""
-    name = "convex" if method == "auto" else method
-    timing = raised if name == "convex" else None
-    yield from (Attempt(task, way, name, METHODS[name], timing) for way in ways)
-    if method == "auto":
-        yield Attempt(task, ways[0], "nlp", groups.last_resort)
-
-
-def attempt(scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: Progress) -> Certified:
-    """Fly one attempt and certify it.
+def attempt(
+    scenario: Scenario, one: Attempt, bound: float, watch: Watch, tell: Progress, lead: Lead
+) -> Certified:
+    """Fly one attempt and certify it; `lead` notes how near it came.
 
     Raises InfeasibleError when limits or margins are not kept or a clause is not proved; InputError when
     the plan is too large for the wire.
     """
     tell("build", bound)
     flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell, one.timing)
+    lead.tried.append((one, flight.margins))
     one = replace(one, way=flight.way)
     watch.lap("solve")
     watch.move(flight.build_s, "solve", "build")

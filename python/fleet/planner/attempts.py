@@ -1,0 +1,52 @@
+"""What is tried until there is a plan: itineraries as they are, then the nearest misses with more effort."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from . import groups
+from .convex import Margins
+from .improve import Attempt, Lead
+from .knots import Array
+from .problem import Problem
+from .progress import Progress
+from .schedule import Itinerary
+from .setup import Setup
+from .timing import raised
+
+#: Planning methods by name.
+METHODS: dict[str, groups.Method] = {"convex": groups.steps, "nlp": groups.nonlinear}
+#: Near misses whose visits are moved, and that are then flown with segments of half the length.
+NEAREST = 2
+
+
+def attempts(task: Problem, ways: list[Itinerary], method: str, lead: Lead) -> Iterator[Attempt]:
+    """Itineraries and methods in the order in which they are tried, until something leads."""
+    name = "convex" if method == "auto" else method
+    run = METHODS[name]
+    yield from (Attempt(task, way, name, run, if_kept if name == "convex" else None) for way in ways)
+    if name != "convex":
+        return
+    near = nearest(lead)
+    yield from (replace(one, timing=raised) for one in near)
+    # A piece is beyond one face of each obstacle: shorter ones get round corners that longer ones cannot.
+    fine = replace(task, segment=task.segment / 2)
+    yield from (replace(one, task=fine, timing=raised) for one in near)
+    if method == "auto":
+        yield Attempt(task, ways[0], "nlp", groups.last_resort)
+
+
+def nearest(lead: Lead) -> list[Attempt]:
+    """The attempts that came nearest to what limits and the tube ask; the first of equal ones."""
+    ranked = sorted(lead.tried, key=lambda t: (t[1].share > 1, -t[1].tube))
+    return [one for one, _ in ranked[:NEAREST]]
+
+
+def if_kept(
+    stage: Setup, x: Array, margins: Margins, progress: Progress | None
+) -> tuple[Setup, Array, Margins]:
+    """Visits are moved for more robustness where limits and the tube are kept already: it takes long."""
+    if margins.share > 1 or margins.tube < -1e-6:
+        return stage, x, margins
+    return raised(stage, x, margins, progress)
