@@ -216,8 +216,8 @@ def nonlinear(stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
 
 
 def last_resort(stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
-    """The nonlinear program where convex steps have failed, with less patience."""
+    """The nonlinear program where convex steps have failed, with less effort."""
     from . import nlp
 
-    x, margins, _ = nlp.optimise(stage, None, progress, nlp.LAST_PATIENCE)
+    x, margins, _ = nlp.optimise(stage, None, progress, nlp.LAST_EFFORT)
     return x, margins

@@ -8,8 +8,8 @@ through the smooth robustness of smooth.py. Solvers are built once for each shap
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -28,10 +28,10 @@ Progress = Callable[[str, float], None]
 SHARPER = (1.0, 4.0, 16.0)
 #: Margins round a corner are measured on parts of a piece, up to this much too low [m].
 MEASURED = 5e-3
-#: CPU time after which a solve of clauses without a normal form is given up [s].
-PATIENCE = 5.0
-#: The same where the nonlinear program is the last resort, so that a refusal does not take long [s].
-LAST_PATIENCE = 2.0
+#: Iterations times unknowns and constraints after which solves of clauses without a normal form are given
+#: up, and all solves where the program is the last resort, so that a refusal does not take long. A million
+#: takes 6 to 20 s of one core. No clock decides: the same scenario must give the same plan.
+EFFORT, LAST_EFFORT = 6e5, 2e5
 #: Solves with further pieces posed, when a solution passes what was not posed.
 ROUNDS = 4
 
@@ -61,12 +61,12 @@ def solve(
     now: Array,
     margins: Margins,
     hold: float | None,
-    patience: float,
+    effort: Effort,
     tell: Callable[[], None] | None = None,
 ) -> Array | None:
     """One solve, sharpening smooth robustness if there is any; None unless IPOPT succeeded.
 
-    `tell` is called after every iteration, and what it raises ends the solve.
+    `effort` is spent. `tell` is called after every iteration, and what it raises ends the solve.
     """
     task, bound = steps.setup.problem, steps.setup.bound
     weight, least = (SOFT, -1e3) if hold is None else (1.0, hold)
@@ -74,11 +74,10 @@ def solve(
     quasi = bool(task.spec.rest)
     solver = solver_for(steps.setup.grid.size, parts, task.max_iterations, task.tolerance, quasi=quasi)
     guess = np.concatenate([now, [min(margins.r, bound)], *(t.guess for t in parts)])
-    began = time.process_time()
+    size = len(guess) + sum(solver.counts)
 
     def listen() -> None:
-        if quasi and time.process_time() - began > patience:
-            raise OutOfPatience
+        effort.spend(size)
         if tell is not None:
             tell()
 
@@ -88,25 +87,42 @@ def solve(
             if found is None:
                 return None
             guess = found
-    except OutOfPatience:
+    except OutOfEffort:
         return None
     return guess[: steps.setup.grid.size]
 
 
-class OutOfPatience(Exception):
-    """A solve of clauses without a normal form has taken too long."""
+class OutOfEffort(Exception):
+    """Solves have taken too long."""
+
+
+@dataclass
+class Effort:
+    """What solves may still take together: iterations times unknowns and constraints."""
+
+    left: float
+
+    def spend(self, size: int) -> None:
+        """One iteration of a program of `size`; raises OutOfEffort when nothing is left."""
+        if self.left <= 0:
+            raise OutOfEffort
+        self.left -= size
 
 
 def optimise(
     setup: Setup,
     start: Array | None = None,
     progress: Progress | None = None,
-    patience: float = PATIENCE,
+    effort: float | None = None,
 ) -> tuple[Array, Margins, int]:
-    """Maximise r, then minimise energy at the r reached, from the warm start or from `start`."""
+    """Maximise r, then minimise energy at the r reached, from the warm start or from `start`.
+
+    `effort` bounds all solves together; None is `EFFORT` for clauses without a normal form, else no bound.
+    """
     steps = Steps.of(setup)
     best = warm_start(setup) if start is None else start
-    top, count, began = steps.margins(best), 0, time.process_time()
+    top, count = steps.margins(best), 0
+    budget = Effort(effort or (EFFORT if setup.problem.spec.rest else np.inf))
     for hold in (False, True):
         # Quasi-Newton steps hardly get anywhere on energy; `SOFT` has kept the flight smooth already.
         if hold and (not usable(top) or setup.problem.spec.rest):
@@ -116,7 +132,7 @@ def optimise(
         for _ in range(ROUNDS):
             steps.rows(x, setup.bound if level is None else level)
             tell = None if progress is None else partial(progress, "nlp", top.r)
-            found = solve(steps, best, top, level, patience - (time.process_time() - began), tell)
+            found = solve(steps, best, top, level, budget, tell)
             count += 1
             if found is None:
                 break
