@@ -147,7 +147,8 @@ def order(rng: Random, place: World, T: float) -> str:
     """A target is closed until another one has been visited, perhaps by another drone."""
     one, two = drone(rng, place), drone(rng, place)
     end = float(np.floor(rng.uniform(0.4, 0.7) * T / GRID) * GRID)
-    return f"(not {one} in {target(rng, place)}) until[0,{end:g}] {two} in {target(rng, place)}"
+    places = rng.permutation(len(place.targets))[:2]
+    return f"(not {one} in tr{places[0] + 1}) until[0,{end:g}] {two} in tr{places[-1] + 1}"
 
 
 def choice(rng: Random, place: World, T: float) -> str:
@@ -162,8 +163,8 @@ def choice(rng: Random, place: World, T: float) -> str:
 def meet(rng: Random, place: World, T: float) -> str:
     """Two drones are in two targets at once."""
     a, b = two(rng, place)
-    when, one, other = window(rng, T, 0.7, 0.2 * T), target(rng, place), target(rng, place)
-    return f"eventually{when} ({a} in {one} and {b} in {other})"
+    when, places = window(rng, T, 0.7, 0.2 * T), rng.permutation(len(place.targets))[:2]
+    return f"eventually{when} ({a} in tr{places[0] + 1} and {b} in tr{places[-1] + 1})"
 
 
 def answer(rng: Random, place: World, T: float) -> str:
