@@ -199,6 +199,9 @@ fn release(left: &Bounds, right: &Bounds, window: Window) -> Bounds {
         let (mut freed, mut least) = (freed, right.cells[k + from].max(freed));
         for j in k + from + 1..=last {
             freed = freed.max(left.points[j]);
+            if freed.rho >= least.rho {
+                break;
+            }
             least = least.min(right.cells[j].max(freed));
         }
         least

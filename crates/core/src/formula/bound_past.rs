@@ -85,6 +85,9 @@ pub fn trigger(left: &Bounds, right: &Bounds, window: Window, count: usize) -> B
         let mut least = right.cells[last].max(made_up);
         for j in (first..last).rev() {
             made_up = made_up.max(left.points[j + 1]);
+            if made_up.rho >= least.rho {
+                break;
+            }
             least = least.min(right.cells[j].max(made_up));
         }
         least
