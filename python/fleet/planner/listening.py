@@ -20,13 +20,13 @@ class Listener(ca.Callback):
         unknowns, constraints, parameters = sizes
         self.rows = {"x": unknowns, "f": 1, "g": constraints}
         self.rows |= {"lam_x": unknowns, "lam_g": constraints, "lam_p": parameters}
-        self.tell: Callable[[], None] | None = None
+        self.tell: Callable[[Any], None] | None = None
         self.raised: BaseException | None = None
         self.construct(name, {})
 
     @contextmanager
-    def listening(self, tell: Callable[[], None] | None) -> Iterator[None]:
-        """Call `tell` after every iteration; what it raises ends the solve, and is raised at the end.
+    def listening(self, tell: Callable[[Any], None] | None) -> Iterator[None]:
+        """Call `tell` with the unknowns after every iteration; what it raises ends the solve, and this block.
 
         CasADi reports every exception of a callback as one and the same failure.
         """
@@ -43,7 +43,7 @@ class Listener(ca.Callback):
         """One iteration is done; 1 stops the solver."""
         try:
             if self.tell is not None:
-                self.tell()
+                self.tell(arg[0])
         except BaseException as error:  # noqa: BLE001 - raised again at the end of `listening`
             self.raised = error
             return [1]

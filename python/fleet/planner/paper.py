@@ -8,23 +8,26 @@ robustness counts. Knots of the plan are samples: all of them, or as many as the
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fleet import _core
 from fleet.errors import InfeasibleError, InputError
 from fleet.errors import Problem as Fault
 from fleet.stl.vocabulary import Formula
 
 from .knots import KNOT, Array, Grid
 from .problem import Problem
+from .progress import TimeUp
 from .result import trajectory
 from .samples import Hessian, Optimum, maximise
 from .schedule import Itinerary, Stop
 from .setup import MOST_SEGMENTS, setup, warm_start
-from .signals import Signals
+from .signals import wire_regions
 from .smooth import leaves
 from .spec import negation_normal
 from .thinning import thinned
@@ -33,6 +36,8 @@ Tell = Callable[[str, float], None]
 
 #: Largest residual of the dynamics of a result that counts [m, m/s]: IPOPT's own tolerance of constraints.
 RESIDUAL = 1e-4
+#: Iterations between two looks at the exact robustness, which takes a while.
+OFTEN = 10
 #: Most predicate values of a mission: 1 GB of memory at 0.5 GB a million, measured on `multi_line`.
 LARGEST = 2_000_000
 #: Difference of exact robustness that decides between two results [m]; below it, iterations do.
@@ -60,12 +65,19 @@ def fly(
 ) -> tuple[Grid, Array, Itinerary, Found, list[Found]]:
     """Knots of all drones, the itinerary at the times kept, the solve that made them, and the others.
 
-    Raises InfeasibleError when neither solve ends with trajectories, InputError for too large a mission.
+    Where the time is up after the first solve, that is all. Raises InfeasibleError when neither solve ends
+    with trajectories, InputError for too large a mission.
     """
     refuse_size(task, formulas)
     mission = settled({"op": "and", "fs": [negation_normal(f) for f in formulas]}, visited(task, way))
     warm = sampled(task, way)
-    found = [solve(task, mission, formulas, warm, hessian, tell) for hessian in Hessian]
+    found: list[Found] = []
+    for hessian in Hessian:
+        try:
+            found.append(solve(task, mission, formulas, warm, hessian, tell))
+        except TimeUp:
+            if not found:
+                raise
     good = [f for f in found if f.optimum.residual <= RESIDUAL]
     if not good:
         raise InfeasibleError("the paper's program was not solved; " + "; ".join(f.describe() for f in found))
@@ -90,16 +102,24 @@ def solve(
 ) -> Found:
     """One solve from samples `warm` (d, n, 9), judged by the formulas as they were written."""
 
+    judge = _core.Fleet(list(task.ids), wire_regions(task.regions))
+
     def exact(positions: Array) -> float:
-        judge = Signals.of(task, positions)
-        return min(judge.fleet.evaluate(f, positions, task.sample)[0] for f in formulas)
+        trace = np.ascontiguousarray(positions)
+        return min(judge.evaluate(f, trace, task.sample)[0] for f in formulas)
+
+    rho = -math.inf
+
+    def watch(iteration: int, positions: Array) -> None:
+        nonlocal rho
+        if iteration % OFTEN == 0:
+            rho = exact(positions)
+        tell(f"{hessian} Hessian, iteration {iteration}", rho)
 
     begin = time.perf_counter()
-    optimum = maximise(
-        task, mission, warm, hessian, lambda k, p: tell(f"{hessian} Hessian, iteration {k}", exact(p))
-    )
+    optimum = maximise(task, mission, warm, hessian, watch)
     spent = time.perf_counter() - begin - optimum.build_s
-    return Found(hessian, optimum, exact(np.ascontiguousarray(optimum.samples[:, :, :3])), spent)
+    return Found(hessian, optimum, exact(optimum.samples[:, :, :3]), spent)
 
 
 def visited(task: Problem, way: Itinerary) -> set[tuple[str, str]]:

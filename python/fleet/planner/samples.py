@@ -10,6 +10,8 @@ and that much is kept back. The three axes are one problem, because obstacles an
 
 from __future__ import annotations
 
+import itertools
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,21 +21,18 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from fleet.interrupt import unswallowed
 from fleet.stl.vocabulary import Formula
 
 from .algebra import Score, Symbols
 from .knots import KNOT, Array
 from .lifted import Lifted
+from .listening import Listener
 from .problem import Problem
 from .program import Program
 from .smooth import Smooth
 
-#: Called with the iteration and positions (d, n, 3) [m].
+#: Called with the iteration and positions (d, n, 3) [m]; what it raises ends the solve.
 Watcher = Callable[[int, Array], None]
-#: Iterations between two calls of the watcher.
-OFTEN = 10
-
 
 #: Share of a_max that may be used: rounding of the result takes the rest.
 SPARED = 0.999
@@ -74,42 +73,15 @@ class Optimum:
     build_s: float
 
 
-class Watching(ca.Callback):
-    """Tells a watcher now and then where the iterations are."""
+def telling(shape: tuple[int, ...], watcher: Watcher) -> Callable[[Any], None]:
+    """What is called with the unknowns after every iteration; samples of `shape` (d, n, 9) come first."""
+    count = itertools.count()
 
-    def __init__(self, sizes: tuple[int, int], shape: tuple[int, int, int], watcher: Watcher) -> None:
-        """`sizes` number of unknowns and constraints, `shape` (d, n, 9) of the leading unknowns."""
-        ca.Callback.__init__(self)
-        self._sizes, self._shape, self._watcher = sizes, shape, watcher
-        self._count = 0
-        self.construct("watching", {})
+    def tell(unknowns: Any) -> None:
+        samples = np.asarray(unknowns).ravel()[: math.prod(shape)].reshape(shape)
+        watcher(next(count), samples[:, :, :3])
 
-    def get_n_in(self) -> int:
-        """Outputs of a solver."""
-        return int(ca.nlpsol_n_out())
-
-    def get_n_out(self) -> int:
-        """Whether to stop."""
-        return 1
-
-    def get_name_in(self, i: int) -> str:
-        """Names as the solver's."""
-        return str(ca.nlpsol_out(i))
-
-    def get_sparsity_in(self, i: int) -> Any:
-        """Shapes as the solver's."""
-        unknowns, constraints = self._sizes
-        rows = {"x": unknowns, "lam_x": unknowns, "g": constraints, "lam_g": constraints, "f": 1}
-        return ca.Sparsity.dense(rows.get(str(ca.nlpsol_out(i)), 0), 1)
-
-    def eval(self, arguments: Any) -> list[int]:
-        """One iteration."""
-        if self._count % OFTEN == 0:
-            leading = int(np.prod(self._shape))
-            samples = np.asarray(arguments[0]).ravel()[:leading].reshape(self._shape)
-            self._watcher(self._count, np.ascontiguousarray(samples[:, :, :3]))
-        self._count += 1
-        return [0]
+    return tell
 
 
 def pose_dynamics(program: Program, task: Problem, warm: Array) -> Mapping[str, Any]:
@@ -145,7 +117,7 @@ def maximise(task: Problem, mission: Formula, warm: Array, hessian: Hessian, wat
     algebra = Lifted(program, task.c) if hessian is Hessian.EXACT else Symbols(Score.PAPER, task.c)
     score = Smooth(positions, task.regions, task.sample, algebra).at_start(mission)
     unknowns, g = ca.vertcat(*program.unknowns), ca.vertcat(*program.g)
-    watching = Watching((unknowns.numel(), g.numel()), warm.shape, watcher)
+    listener = Listener("listener", (unknowns.numel(), g.numel(), 0))
     options: dict[str, Any] = {
         "ipopt": {
             "linear_solver": "mumps",
@@ -158,12 +130,12 @@ def maximise(task: Problem, mission: Formula, warm: Array, hessian: Hessian, wat
         "print_time": False,
         # A step too far overflows an exponent; IPOPT then shortens it.
         "show_eval_warnings": False,
-        "iteration_callback": watching,
+        "iteration_callback": listener,
     }
     solver = ca.nlpsol("paper", "ipopt", {"x": unknowns, "f": -score, "g": g}, options)
     build = time.perf_counter() - begin
     low, high = (np.concatenate(rows) for rows in (program.g_low, program.g_high))
-    with unswallowed():
+    with listener.listening(telling(warm.shape, watcher)):
         found = solver(
             x0=np.concatenate(program.guess),
             lbx=np.concatenate(program.low),

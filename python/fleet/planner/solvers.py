@@ -106,7 +106,7 @@ def run(
     free = len(guess) - sum(len(t.guess) for t in terms) - 1
     low = [np.full(free + 1, -np.inf), *(np.full(len(t.guess), t.own_low) for t in terms)]
     high = [np.full(free, np.inf), np.array([bound]), *(np.full(len(t.guess), t.own_high) for t in terms)]
-    with solver.listener.listening(tell):
+    with solver.listener.listening(None if tell is None else lambda _unknowns: tell()):
         found = solver.function(
             x0=guess,
             p=np.concatenate([[weight, c], *(t.numbers for t in terms)]),
