@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .legs import Legs
-from .vehicles import TICKS, Orders, cost, latest, ticks
+from .legs import Legs, cost
+from .vehicles import TICKS, Orders, latest, ticks
 
 #: What a second of makespan weighs against a second of total time.
 MAKESPAN = 1000

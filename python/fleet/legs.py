@@ -72,3 +72,9 @@ def tour_time(legs: Legs, drone: int, order: Sequence[int]) -> float:
         tour = extended(tour, legs, drone, e)
     home = tour.t + float(legs.last[drone, order[-1]])
     return home if home <= legs.horizon + 1e-9 else np.inf
+
+
+def cost(legs: Legs, orders: Sequence[Sequence[int]]) -> tuple[float, float]:
+    """Makespan and total time [s] of an assignment; infinite when it misses a window."""
+    times = [tour_time(legs, d, order) for d, order in enumerate(orders)]
+    return max(times), sum(times)

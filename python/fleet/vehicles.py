@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from .legs import Legs, tour_time
+from .legs import Legs, cost
 
 #: Ticks of the model's clock in one second; legs are rounded up and windows inwards.
 TICKS = 1_000_000
@@ -143,12 +143,6 @@ def optimal(legs: Legs, start: Orders | None) -> Orders | None:
             # Each leg may have been rounded up by a tick.
             whole.cp.add(whole.makespan <= ticks(cost(legs, best)[0]) + legs.first.shape[1] + 2)
     return best
-
-
-def cost(legs: Legs, orders: Orders) -> tuple[float, float]:
-    """Makespan and total time [s] of an assignment; infinite when it misses a window."""
-    times = [tour_time(legs, d, order) for d, order in enumerate(orders)]
-    return max(times), sum(times)
 
 
 def search(whole: Model, effort: float | None) -> Orders | None:

@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 
 from fleet.assign import EXACT, assign, exact, insert, large
-from fleet.legs import Legs, tour_time
+from fleet.legs import Legs, cost, tour_time
 from fleet.planner import Status, plan
 from fleet.planner.problem import problem
 from fleet.planner.schedule import schedules
 from fleet.scenario import load
-from fleet.vehicles import cost
 
 from .test_planner_assign import random_legs
 
@@ -151,6 +150,18 @@ def test_orders_by_hand_go_before_the_papers_split(tmp_path: Path) -> None:
     tables = "\n".join(f"{d} = {order}" for d, order in hand.items())
     path.write_text(f'{text}\n[planner]\nassignment = "paper"\n\n[assignment]\n{tables}\n')
     assert plan(load(path)).assignment == hand
+
+
+@pytest.mark.parametrize("text", ["d1 in tr1 or d1 in tr4", "d1 in tr4 or d1 in tr1"])
+def test_of_two_regions_of_one_drone_the_one_in_reach_is_taken(tmp_path: Path, text: str) -> None:
+    """tr4 cannot be reached in 8 s; that it is named last is no reason to give up, let alone a proof."""
+    rules = ["@safe always[0,T] all d: d outside obstacles", f"@one eventually[0,8] ({text})"]
+    formula = 'seed = 1\nformula = """\n' + "\n".join(rules) + '\n"""\n'
+    path = tmp_path / "either.toml"
+    path.write_text((SCENARIOS / "power_tower.toml").read_text().replace("seed = 1\n", formula, 1))
+    found = plan(load(path))
+    assert found.assignment == {"d1": ["tr1"], "d2": []}
+    assert found.rho > 0.9
 
 
 def test_ctrl_c_ends_a_proof_that_would_take_for_ever() -> None:

@@ -18,6 +18,7 @@ from fleet.errors import Need
 from fleet.legs import Legs, tour_time
 from fleet.route import leg_time, turn_time
 
+from .choices import ambiguous
 from .knots import Array
 from .leg_times import permitted
 from .necessary import Geometry, gatherings
@@ -64,9 +65,12 @@ def ramp(length: Array, v_max: float, a_max: float) -> Array:
 
 
 def least_times(problem: Problem, geometry: Geometry) -> Reach:
-    """Lower bounds of all legs of the visits, those that `rest` needs included; infinite where barred."""
+    """Lower bounds of all legs of the visits, those that `rest` needs included; infinite where barred.
+
+    Visits that one drone may make in several regions are left out: bounds without them are bounds still.
+    """
     extra = needed_by_rest(problem)
-    visits = (*problem.spec.visits, *extra)
+    visits = (*(visit for visit in problem.spec.visits if not ambiguous(visit)), *extra)
     drones, n = len(problem.ids), len(visits)
     first, last = np.full((drones, n), np.inf), np.full((drones, n), np.inf)
     between = np.full((drones, n, n), np.inf)

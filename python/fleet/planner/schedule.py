@@ -10,11 +10,12 @@ import numpy as np
 
 from fleet.assign import EXACT, assign
 from fleet.errors import InfeasibleError
-from fleet.legs import Legs
+from fleet.legs import Legs, cost
 from fleet.route import spread
 
+from .choices import chosen
 from .knots import Array
-from .leg_times import leg_times
+from .leg_times import Ease, leg_times
 from .problem import Problem
 from .spec import Visit
 from .survey import Map, survey
@@ -94,22 +95,36 @@ def timed_itineraries(problem: Problem, world: Map) -> Iterator[Itinerary]:
     """The itineraries of `schedules` over the ways of `world`; none when a window would be missed."""
     known: list[tuple[object, ...]] = []
     for ease in (*EASE, "through", "edges", None):
-        legs = leg_times(problem, world, ease)
-        orders = assign(legs, proved=problem.proved)
-        if orders is None:
+        found = assigned(problem, world, ease)
+        if found is None:
             continue
-        orders = by_hand(problem, orders)
-        timed = [event_times(problem, legs, d, order) for d, order in enumerate(orders)]
+        one, ways, legs, orders = found
+        orders = by_hand(one, orders)
+        timed = [event_times(one, legs, d, order) for d, order in enumerate(orders)]
         times = [t for t in timed if t is not None]
         if len(times) < len(timed):
             continue
-        mark = (*map(tuple, orders), *map(tuple, times))
+        mark = (ways.place, *map(tuple, orders), *map(tuple, times))
         if mark not in known:
-            yield itinerary(problem, world, orders, times)
+            yield itinerary(one, ways, orders, times)
         for late in (False, True) if not known else ():
-            shifted = [extreme_times(problem, legs, d, order, late) for d, order in enumerate(orders)]
-            yield itinerary(problem, world, orders, shifted)
+            shifted = [extreme_times(one, legs, d, order, late) for d, order in enumerate(orders)]
+            yield itinerary(one, ways, orders, shifted)
         known.append(mark)
+
+
+def assigned(
+    problem: Problem, world: Map, ease: Ease | None
+) -> tuple[Problem, Map, Legs, list[tuple[int, ...]]] | None:
+    """The assignment of least makespan over all choices of regions, with what it chose; None if none fits."""
+    best: tuple[Problem, Map, Legs, list[tuple[int, ...]]] | None = None
+    least = (np.inf, np.inf)
+    for one, ways in chosen(problem, world):
+        legs = leg_times(one, ways, ease)
+        orders = assign(legs, proved=problem.proved)
+        if orders is not None and (best is None or cost(legs, orders) < least):
+            best, least = (one, ways, legs, orders), cost(legs, orders)
+    return best
 
 
 def event_times(problem: Problem, legs: Legs, drone: int, order: tuple[int, ...]) -> Array | None:

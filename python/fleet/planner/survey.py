@@ -47,8 +47,7 @@ def survey(problem: Problem, bound: float, *, local: bool = False) -> Map:
     regions = sorted({r for v in problem.spec.visits for _, r in v.options} | set(problem.homes))
     points = np.vstack([problem.starts, *(problem.centers[r][None] for r in regions)])
     number = {r: n + k for k, r in enumerate(regions)}
-    options = [dict(v.options) for v in problem.spec.visits]
-    place = tuple(tuple(number[o[name]] if name in o else -1 for o in options) for name in problem.ids)
+    place = places(problem, number)
     home = tuple(number[r] for r in problem.homes)
     names = (*(f"start of {d}" for d in problem.ids), *regions)
     if local:
@@ -64,6 +63,12 @@ def survey(problem: Problem, bound: float, *, local: bool = False) -> Map:
     room = problem.regions[problem.workspace]
     paths = routes(problem, points, everywhere, every, room, place, home, bound)
     return Map(Network(paths), points, names, tuple(range(n)), home, place)
+
+
+def places(problem: Problem, number: Mapping[str, int]) -> tuple[tuple[int, ...], ...]:
+    """`Map.place` for numbered regions; of several regions of one drone the last (see choices.py)."""
+    options = [dict(v.options) for v in problem.spec.visits]
+    return tuple(tuple(number[o[name]] if name in o else -1 for o in options) for name in problem.ids)
 
 
 def routes(

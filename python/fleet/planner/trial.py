@@ -12,6 +12,7 @@ from fleet.errors import InfeasibleError, Need
 
 from . import convex, groups
 from .ceiling import rho_bound
+from .choices import ambiguous
 from .knots import Array
 from .leg_times import leg_times
 from .problem import Problem
@@ -157,7 +158,7 @@ class Trials:
     def times(self, task: Problem) -> Iterator[Need]:
         """Times at which the visits of a part can be made along the ways that were found."""
         n = len(task.spec.visits)
-        if not 0 < n <= EXACT or n + len(task.ids) > SURVEYED:
+        if not 0 < n <= EXACT or n + len(task.ids) > SURVEYED or any(map(ambiguous, task.spec.visits)):
             return
         world = survey(task, task.tube)
         reach = Reach(task, tuple(task.spec.visits), leg_times(task, world, None))
