@@ -23,12 +23,14 @@ from .reorder import reordered, shifted
 from .result import PlanResult, squared_acceleration
 from .schedule import Itinerary
 from .setup import MOST_SEGMENTS, Setup, warm_start
-from .timing import raised, retime
+from .timing import ENERGY_TRIALS, raised, retime
 
 #: Energy steps of one attempt at most, and the share that a step has to save for another one.
 POLISHING, SAVED = 10, 1e-3
 #: Robustness given up where visits move [m]: far below the millimetre that counts.
 HAIR = 1e-5
+#: Visit times tried at first, so that large fleets have something of it soon.
+FEW = 8
 #: Shortest segment that finer knots come down to [s].
 FINEST = 0.2
 #: Random attempts in a row without a better plan after which one at its bound is left as it is.
@@ -79,7 +81,8 @@ def improvements(
         return
     if lead.best is not None:
         yield again(lead, "convex", polished)
-        yield replace(again(lead, "convex", polished), timing=thriftier)
+        for trials in (FEW, ENERGY_TRIALS):
+            yield replace(again(lead, "convex", polished), timing=partial(thriftier, trials=trials))
     for way in ways[1:]:
         yield Attempt(task, way, "convex", climbed, raised)
     if task.pairs():
@@ -167,13 +170,13 @@ def polished(
 
 
 def thriftier(
-    stage: Setup, x: Array, margins: Margins, progress: Progress | None
+    stage: Setup, x: Array, margins: Margins, progress: Progress | None, trials: int = ENERGY_TRIALS
 ) -> tuple[Setup, Array, Margins]:
     """Visits at times that raise r, where it can be, and then at times that save energy at the r reached."""
     stage, x, margins = raised(stage, x, margins, progress)
     if margins.share > 1:
         return stage, x, margins
-    found = retime(stage, x, hold=margins.r - HAIR, weights={2: 1.0}, progress=progress)
+    found = retime(stage, x, hold=margins.r - HAIR, weights={2: 1.0}, trials=trials, progress=progress)
     return found.stage, found.x, found.margins
 
 
