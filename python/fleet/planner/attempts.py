@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from fleet.assign import EXACT
+
 from . import groups
 from .convex import Margins
 from .improve import Attempt, Lead
@@ -24,7 +26,10 @@ NEAREST = 2
 def attempts(task: Problem, ways: list[Itinerary], method: str, lead: Lead) -> Iterator[Attempt]:
     """Itineraries and methods in the order in which they are tried, until something leads."""
     name = "convex" if method == "auto" else method
-    run = METHODS[name]
+    fallback = groups.Fallback()
+    run = fallback.steps if method == "auto" else METHODS[name]
+    if len(task.spec.visits) > EXACT and not task.spec.changing(task.horizon):
+        ways = ways[:1]  # a large fleet is not flown anew for visits earlier or later
     yield from (Attempt(task, way, name, run, if_kept if name == "convex" else None) for way in ways)
     if name != "convex":
         return
@@ -34,7 +39,7 @@ def attempts(task: Problem, ways: list[Itinerary], method: str, lead: Lead) -> I
     fine = replace(task, segment=task.segment / 2)
     yield from (replace(one, task=fine, timing=raised) for one in near)
     if method == "auto":
-        yield Attempt(task, ways[0], "nlp", groups.last_resort)
+        yield Attempt(task, ways[0], "nlp", fallback.last_resort)
 
 
 def nearest(lead: Lead) -> list[Attempt]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import sparse
@@ -215,9 +215,31 @@ def nonlinear(stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
     return x, margins
 
 
-def last_resort(stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
-    """The nonlinear program where convex steps have failed, with less effort."""
-    from . import nlp
+@dataclass
+class Fallback:
+    """The nonlinear program as the last resort: only for the parts in which convex steps fell short."""
 
-    x, margins, _ = nlp.optimise(stage, None, progress, nlp.LAST_EFFORT)
-    return x, margins
+    kept: dict[tuple[object, ...], tuple[Array, Margins]] = field(default_factory=dict)
+
+    @staticmethod
+    def key(stage: Setup) -> tuple[object, ...]:
+        """What tells one part from another: its drones, what they keep, and the times of their visits."""
+        times = tuple(s.t for stops in stage.itinerary.stops for s in stops)
+        return (stage.problem.ids, tuple(stage.problem.spec.invariants), times, stage.grid.size)
+
+    def steps(self, stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
+        """The method of convex steps; remembers the parts that keep limits and the tube's margins."""
+        x, margins = steps(stage, progress)
+        if margins.share <= 1 and margins.tube >= -1e-6:
+            self.kept[self.key(stage)] = (x, margins)
+        return x, margins
+
+    def last_resort(self, stage: Setup, progress: Progress | None) -> tuple[Array, Margins]:
+        """What convex steps have found, or the nonlinear program with less effort."""
+        known = self.kept.get(self.key(stage))
+        if known is not None and not stage.problem.spec.rest:
+            return known
+        from . import nlp
+
+        x, margins, _ = nlp.optimise(stage, None, progress, nlp.LAST_EFFORT)
+        return x, margins

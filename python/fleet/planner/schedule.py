@@ -25,6 +25,8 @@ from .turns import least_legs
 EASE = (1.4, 1.15, 1.0)
 #: Share of the mission that visits keep from the ends of their windows, where time allows.
 SPARE = 0.04
+#: Fleets up to this size are routed over the whole map [drones].
+FEW = 8
 
 
 @dataclass(frozen=True)
@@ -58,17 +60,21 @@ def by_hand(problem: Problem, orders: list[tuple[int, ...]]) -> list[tuple[int, 
     return out
 
 
-def schedules(problem: Problem, bound: float) -> Iterator[Itinerary]:
+def schedules(problem: Problem, bound: float, *, whole: bool = True) -> Iterator[Itinerary]:
     """Itineraries to start from, routed at a clearance of up to `bound` [m], in order of preference.
 
     The first spreads the slack evenly; then come visits as early and as late as can be, for invariants
-    that hold over a part of the mission only, and then those of faster legs. Raises InfeasibleError,
-    naming the clause, when even flight through at v_max misses a window.
+    that hold over a part of the mission only, and then those of faster legs. Large fleets are routed
+    among near places, and where that fails over the `whole` map. Raises InfeasibleError, naming the
+    clause, when even flight through at v_max misses a window.
     """
     problem = replace(problem, obstacles=problem.walls())
-    if len(problem.spec.visits) > EXACT:
-        found = list(timed_itineraries(problem, survey(problem, bound, local=True)))
-        if found:
+    if len(problem.spec.visits) > EXACT or len(problem.ids) > FEW:
+        world = survey(problem, bound, local=True)
+        found = list(timed_itineraries(problem, world))
+        if found or not whole:
+            if not found:
+                raise unreachable(problem, world)
             yield from found
             return
     world = survey(problem, bound)

@@ -67,6 +67,11 @@ class Specification:
     rest: list[Rest] = field(default_factory=list)
     kinds: dict[str, str] = field(default_factory=dict)
 
+    def changing(self, horizon: float) -> bool:
+        """Whether what must be kept depends on the time: visits are better early, or late, then."""
+        whole = all(i.window[0] <= 0 and i.window[1] >= horizon - 1e-9 for i in self.invariants)
+        return bool(self.rest) or not whole
+
 
 DUAL = {"always": "eventually", "eventually": "always", "once": "historically", "historically": "once"}
 """What the negation of a temporal operator is, over the negation of its operand."""

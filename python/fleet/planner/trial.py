@@ -19,11 +19,10 @@ from .problem import Problem
 from .progress import Progress, silent
 from .reach import Reach, needs
 from .result import trajectory
-from .schedule import Itinerary, schedules
+from .schedule import FEW, Itinerary, schedules
 from .setup import Setup, warm_start
 from .shortfall import shortfalls
 from .sketch import sketched
-from .spec import Invariant
 from .subset import subset
 from .survey import survey
 
@@ -64,11 +63,6 @@ class ShortError(Exception):
 def kept(margins: convex.Margins) -> bool:
     """Whether limits and the tube's margins are kept."""
     return margins.share <= 1 and margins.tube >= -1e-6
-
-
-def covers(inv: Invariant, horizon: float) -> bool:
-    """Whether an invariant holds over the whole mission."""
-    return inv.window[0] <= 0 and inv.window[1] >= horizon - 1e-9
 
 
 @dataclass
@@ -120,7 +114,7 @@ class Trials:
             ways = routed(task, bound)
         except InfeasibleError as error:
             return error.problems[0].message
-        if not task.spec.rest and all(covers(inv, task.horizon) for inv in task.spec.invariants):
+        if not task.spec.changing(task.horizon):
             ways = ways[:1]  # early and late visits only help past what holds for a part of the mission
         why = None
         for way in ways:
@@ -160,19 +154,19 @@ class Trials:
         n = len(task.spec.visits)
         if not 0 < n <= EXACT or n + len(task.ids) > SURVEYED or any(map(ambiguous, task.spec.visits)):
             return
-        world = survey(task, task.tube)
+        world = survey(task, task.tube, local=len(task.ids) > FEW)
         reach = Reach(task, tuple(task.spec.visits), leg_times(task, world, None))
         yield from (m for m in needs(reach) if m.region not in task.homes or m.needs_s > m.by_s + 1e-9)
 
 
 def routed(task: Problem, bound: float) -> list[Itinerary]:
-    """Itineraries of a part, with the visits that its `rest` needs if that works.
+    """Itineraries of a part, with the visits that its `rest` needs if that works; large fleets locally.
 
     Raises InfeasibleError when there is none.
     """
     if task.spec.rest:
         try:
-            return list(schedules(sketched(task, bound), bound))
+            return list(schedules(sketched(task, bound), bound, whole=False))
         except InfeasibleError:
             pass  # the convex steps may still find a way that the sketch did not
-    return list(schedules(task, bound))
+    return list(schedules(task, bound, whole=False))
