@@ -29,7 +29,8 @@ def attempts(task: Problem, ways: list[Itinerary], method: str, lead: Lead) -> I
     fallback = groups.Fallback()
     run = fallback.steps if method == "auto" else METHODS[name]
     if len(task.spec.visits) > EXACT and not task.spec.changing(task.horizon):
-        ways = ways[:1]  # a large fleet is not flown anew for visits earlier or later
+        # A large fleet is not flown anew for visits that are only earlier or later (`schedules`).
+        ways = [*ways[:1], *ways[3:]]
     yield from (Attempt(task, way, name, run, if_kept if name == "convex" else None) for way in ways)
     if name != "convex":
         return
