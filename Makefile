@@ -7,7 +7,7 @@ RUST   := $(shell find crates sim -name '*.rs' -o -name Cargo.toml) Cargo.toml C
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python check format lock bench bench-plan bench-energy bench-replan bench-tick bench-sim bench-peers clean
+.PHONY: help setup demo test test-rust test-python check format lock bench bench-plan bench-energy bench-random bench-replan bench-tick bench-sim bench-peers clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  \1\t/' | expand -t 18
@@ -52,13 +52,16 @@ lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	$(BIN)/pip install --quiet pip-tools
 	$(BIN)/pip-compile --quiet --extra dev --strip-extras --upgrade --no-emit-index-url --no-emit-trusted-host --no-emit-find-links -o requirements.lock pyproject.toml
 
-bench: bench-plan bench-replan bench-tick bench-sim ## Run every benchmark; tables and target/bench/*.json
+bench: bench-plan bench-random bench-replan bench-tick bench-sim ## Run every benchmark; tables and target/bench/*.json
 
 bench-plan: setup ## Planning time and robustness: ours, the paper's formulation, RRT*; lines of towers (10 minutes)
 	$(BIN)/python -m tests.bench.plan
 
 bench-energy: setup ## Energy-aware plans against a long IPOPT run and the paper's method; minutes
 	$(BIN)/python -m tests.bench.energy
+
+bench-random: setup ## 200 random scenarios, plans before an independent check, refusals before an oracle
+	$(BIN)/python -m tests.bench.random
 
 bench-replan: ## Local replan over random instances
 	cargo run --release --locked -p fleet-core --example bench_replan

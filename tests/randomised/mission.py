@@ -172,8 +172,8 @@ def answer(rng: Random, place: World, T: float) -> str:
     soon = float(rng.choice([5.0, 8.0]))
     end = min(float(np.floor(0.7 * T / GRID) * GRID), T - soon)
     a, b = drone(rng, place), drone(rng, place)
-    asked, then = target(rng, place), target(rng, place)
-    return f"always[0,{end:g}] ({a} in {asked} -> eventually[0,{soon:g}] {b} in {then})"
+    places = rng.permutation(len(place.targets))[:2]
+    return f"always[0,{end:g}] ({a} in tr{places[0] + 1} -> eventually[0,{soon:g}] {b} in tr{places[-1] + 1})"
 
 
 Maker = Callable[[Random, World, float], str]

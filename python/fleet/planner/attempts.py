@@ -19,7 +19,7 @@ from .timing import raised
 
 #: Planning methods by name.
 METHODS: dict[str, groups.Method] = {"convex": groups.steps, "nlp": groups.nonlinear}
-#: Near misses whose visits are moved, and that are then flown with segments of half the length.
+#: Near misses whose visits are moved; as many are then flown with segments of half the length.
 NEAREST = 2
 
 
@@ -34,11 +34,10 @@ def attempts(task: Problem, ways: list[Itinerary], method: str, lead: Lead) -> I
     yield from (Attempt(task, way, name, run, if_kept if name == "convex" else None) for way in ways)
     if name != "convex":
         return
-    near = nearest(lead)
-    yield from (replace(one, timing=raised) for one in near)
+    yield from (replace(one, timing=raised) for one in nearest(lead))
     # A piece is beyond one face of each obstacle: shorter ones get round corners that longer ones cannot.
     fine = replace(task, segment=task.segment / 2)
-    yield from (replace(one, task=fine, timing=raised) for one in near)
+    yield from (replace(one, task=fine, timing=if_kept) for one in nearest(lead))
     if method == "auto":
         yield Attempt(task, ways[0], "nlp", fallback.last_resort)
 

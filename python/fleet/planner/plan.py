@@ -215,8 +215,8 @@ def attempt(
     """
     tell("build", bound)
     flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell, one.timing)
-    lead.tried.append((one, flight.margins))
     one = replace(one, way=flight.way)
+    lead.tried.append((one, flight.margins))
     watch.lap("solve")
     watch.move(flight.build_s, "solve", "build")
     refuse(one.task, flight.margins)
