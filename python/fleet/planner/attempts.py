@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from fleet.assign import EXACT
@@ -23,7 +23,7 @@ METHODS: dict[str, groups.Method] = {"convex": groups.steps, "nlp": groups.nonli
 NEAREST = 2
 
 
-def attempts(task: Problem, ways: list[Itinerary], method: str, lead: Lead) -> Iterator[Attempt]:
+def attempts(task: Problem, ways: Sequence[Itinerary], method: str, lead: Lead) -> Iterator[Attempt]:
     """Itineraries and methods in the order in which they are tried, until something leads."""
     name = "convex" if method == "auto" else method
     fallback = groups.Fallback()

@@ -71,7 +71,7 @@ class Lead:
 
 
 def improvements(
-    task: Problem, ways: list[Itinerary], bound: float, method: str, lead: Lead, seed: int
+    task: Problem, ways: Sequence[Itinerary], bound: float, method: str, lead: Lead, seed: int
 ) -> Iterator[Attempt]:
     """Attempts to beat the lead. They end when it is at its bound and nothing has helped for a while.
 
@@ -121,7 +121,7 @@ def again(lead: Lead, method: str, run: Callable[..., tuple[Array, Margins]]) ->
 
 
 def wandering(
-    task: Problem, ways: list[Itinerary], lead: Lead, rng: np.random.Generator
+    task: Problem, ways: Sequence[Itinerary], lead: Lead, rng: np.random.Generator
 ) -> Iterator[Attempt]:
     """Visits shifted at random and pairs past each other at random, from the lead if there is one."""
     fruitless = 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from .result import PlanResult, result
 from .schedule import Itinerary, schedules
 from .sketch import sketched
 from .watch import Watch
+from .ways import Ways
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
@@ -155,7 +156,7 @@ def baseline(
 
 
 def tries(
-    task: Problem, ways: list[Itinerary], bound: float, method: str, lead: Lead, seed: int | None
+    task: Problem, ways: Sequence[Itinerary], bound: float, method: str, lead: Lead, seed: int | None
 ) -> Iterator[Attempt]:
     """The attempts of `plan` until one leads, then with a `seed` those that may beat it."""
     for one in attempts(task, ways, method, lead):
@@ -194,15 +195,15 @@ def wanted(task: Problem) -> float:
     return min(slack_bound(task), WIDEST)
 
 
-def itineraries(task: Problem, bound: float) -> tuple[list[Itinerary], InfeasibleError | None]:
+def itineraries(task: Problem, bound: float) -> tuple[Ways, InfeasibleError | None]:
     """Itineraries that keep clauses without a normal form too, or those without them and why.
 
     Raises InfeasibleError when not even the other clauses have an itinerary.
     """
     try:
-        return list(schedules(sketched(task, bound), bound)), None
+        return Ways(schedules(sketched(task, bound), bound)), None
     except InfeasibleError as error:
-        return list(schedules(task, bound)), error
+        return Ways(schedules(task, bound)), error
 
 
 def attempt(

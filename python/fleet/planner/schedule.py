@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -71,22 +71,28 @@ def schedules(problem: Problem, bound: float, *, whole: bool = True) -> Iterator
     problem = replace(problem, obstacles=problem.walls())
     if len(problem.spec.visits) > EXACT or len(problem.ids) > FEW:
         world = survey(problem, bound, local=True)
-        found = list(timed_itineraries(problem, world))
-        if found or not whole:
-            if not found:
-                raise unreachable(problem, world)
+        found = begun(timed_itineraries(problem, world))
+        if found is None and not whole:
+            raise unreachable(problem, world)
+        if found is not None:
             yield from found
             return
     world = survey(problem, bound)
-    found = list(timed_itineraries(problem, world))
+    found = begun(timed_itineraries(problem, world))
     asked = asked_for(problem)
-    if not found and asked != problem.obstacles:
+    if found is None and asked != problem.obstacles:
         # Ways keep off every obstacle where they can, and off those of the mission in any case.
         world = survey(replace(problem, obstacles=asked), bound)
-        found = list(timed_itineraries(problem, world))
-    if not found:
+        found = begun(timed_itineraries(problem, world))
+    if found is None:
         raise unreachable(problem, world)
     yield from found
+
+
+def begun(source: Iterator[Itinerary]) -> Iterator[Itinerary] | None:
+    """The iterator with its first item made, or None when it has none."""
+    first = next(source, None)
+    return None if first is None else chain([first], source)
 
 
 def asked_for(problem: Problem) -> tuple[str, ...]:
