@@ -115,7 +115,7 @@ class Trials:
         except InfeasibleError as error:
             return error.problems[0].message
         if not task.spec.changing(task.horizon):
-            ways = ways[:1]  # early and late visits only help past what holds for a part of the mission
+            ways = [*ways[:1], *ways[3:]]  # visits that are only earlier or later help where rules change
         why = None
         for way in ways:
             try:
