@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -23,12 +24,30 @@ Ints = NDArray[np.int64]
 SPACING = 1.5
 #: Segments that are looked at together: bounds memory.
 CHUNK = 200_000
+#: Polyhedra whose vertices are kept.
+KEPT = 4096
 #: A point nearer to a face than this counts as on it [m].
 TOUCH = 1e-6
 
 
 def vertices(faces: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Vertices (k, 3) of the polyhedron with faces (n, 4: normal, offset), and the faces (k, n) at each."""
+    """Vertices (k, 3) of the polyhedron with faces (n, 4: normal, offset), and the faces (k, n) at each.
+
+    Both are shared by all who ask about the same polyhedron, and cannot be written to.
+    """
+    return corners(np.ascontiguousarray(faces, dtype=float).tobytes())
+
+
+@lru_cache(maxsize=KEPT)
+def corners(polyhedron: bytes) -> tuple[Array, NDArray[np.bool_]]:
+    """`vertices` by the bytes of the faces."""
+    points, touch = found_corners(np.frombuffer(polyhedron).reshape(-1, 4))
+    points.flags.writeable = touch.flags.writeable = False
+    return points, touch
+
+
+def found_corners(faces: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """`vertices`, computed: the points of three faces each that lie in no other face's outside."""
     index = np.array(list(combinations(range(len(faces)), 3)))
     normals, offsets = faces[index][:, :, :3], faces[index][:, :, 3]
     regular = np.abs(np.linalg.det(normals)) > 1e-9

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fleet.certificate import verify
 from fleet.planner import nlp, plan, solvers, stages
 from fleet.planner.convex import Steps
+from fleet.planner.knots import difference
 from fleet.planner.problem import problem
+from fleet.planner.rows import gram, smoothness
 from fleet.planner.schedule import schedules
 from fleet.planner.setup import setup, warm_start
+from fleet.route import corners, vertices
 from fleet.scenario import Scenario, load
+from fleet.stl.text import _parser
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -75,3 +80,21 @@ def test_stage_functions_are_built_once() -> None:
     plan(scenario("hover"), method="nlp")
     plan(scenario("power_tower"), method="nlp")
     assert stages.stage.cache_info().misses == 1
+
+
+def test_a_second_plan_by_convex_steps_finds_every_matrix_made() -> None:
+    """Constant matrices, smoothness by knots, corners of regions, the parser of formulas."""
+    kept = (gram, difference, smoothness, corners, _parser)
+    first = plan(scenario("power_tower"))
+    made = [one.cache_info().misses for one in kept]
+    again = plan(scenario("power_tower"))
+    assert [one.cache_info().misses for one in kept] == made
+    assert all(one.cache_info().hits > 0 for one in kept)
+    assert again.data == first.data
+
+
+def test_what_is_shared_cannot_be_written_to() -> None:
+    points, touch = vertices(np.column_stack([np.vstack([np.eye(3), -np.eye(3)]), np.ones(6)]))
+    for matrix in (gram(3), difference(1), points, touch):
+        with pytest.raises(ValueError, match="read-only"):
+            matrix[0] = 0

@@ -15,6 +15,8 @@ def main() -> None:
     usual = signal.getsignal(signal.SIGINT)
     if usual is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _leave)
+    # Our matrices are small: a second thread of numpy's BLAS only waits for the first.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from fleet.cli.app import run
         from fleet.interrupt import deliver_again

@@ -8,6 +8,7 @@ points, which hold their curve over continuous time (Farin, Curves and Surfaces 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,12 +134,19 @@ def merge(*times: Array) -> Array:
     return np.asarray(union[keep])
 
 
+def constant(matrix: Array) -> Array:
+    """The matrix, which from here on cannot be written to: it is shared."""
+    matrix.flags.writeable = False
+    return matrix
+
+
+@cache
 def difference(order: int) -> Array:
-    """Matrix (5 - order + 1, 6): control points of the derivative of `order`, times h^order."""
+    """Matrix (5 - order + 1, 6): control points of the derivative of `order`, times h^order; constant."""
     out = np.eye(6)
     for k in range(order):
         out = (5 - k) * np.diff(out, axis=0)
-    return out
+    return constant(out)
 
 
 def sample(grid: Grid, x: Array, drone: int, times: Array) -> Array:

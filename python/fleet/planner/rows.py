@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from math import comb
 
 import numpy as np
 from scipy import sparse
 
-from .knots import Array, Grid, Ints, Pieces, difference, hermite
+from .knots import Array, Grid, Ints, Pieces, constant, difference, hermite
 
 
 @dataclass(frozen=True)
@@ -115,20 +116,31 @@ def derivative_points(grid: Grid, x: Array, drone: int, order: int) -> Array:
     return np.asarray(derivative_maps(h, order) @ local)
 
 
+@cache
 def gram(degree: int) -> Array:
-    """Integrals of products of Bernstein polynomials of one degree over [0, 1]."""
+    """Integrals of products of Bernstein polynomials of one degree over [0, 1]; constant."""
     n = degree
     w = [[comb(n, i) * comb(n, j) / comb(2 * n, i + j) for j in range(n + 1)] for i in range(n + 1)]
-    return np.asarray(w) / (2 * n + 1)
+    return constant(np.asarray(w) / (2 * n + 1))
 
 
 def energy(grid: Grid, weights: Mapping[int, float]) -> sparse.csc_matrix:
-    """P with `x' P x / 2 = sum over orders of weight * integral |d^order p|^2 dt`, all drones."""
+    """P with `x' P x / 2 = sum over orders of weight * integral |d^order p|^2 dt`, all drones.
+
+    Steps on the same knots share one matrix, which is not to be written to.
+    """
+    return smoothness(tuple(t.tobytes() for t in grid.times), tuple(weights.items()))
+
+
+@lru_cache(maxsize=64)
+def smoothness(knots: tuple[bytes, ...], weights: tuple[tuple[int, float], ...]) -> sparse.csc_matrix:
+    """`energy` by the bytes of the knot times."""
+    grid = Grid(tuple(np.frombuffer(times) for times in knots))
     rows, cols, vals = [], [], []
     for d, times in enumerate(grid.times):
         h = np.diff(times)
         q = np.zeros((len(h), 6, 6))
-        for order, weight in weights.items():
+        for order, weight in weights:
             m = derivative_maps(h, order)
             q += 2 * weight * h[:, None, None] * (m.transpose(0, 2, 1) @ gram(5 - order) @ m)
         base = grid.offsets[d] + 9 * np.arange(len(h))[:, None] + 3 * np.arange(6)[None, :]
