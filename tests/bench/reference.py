@@ -14,10 +14,10 @@ import casadi as ca
 import numpy as np
 
 from fleet.planner.knots import KNOT, Array, hermite, restriction
-from fleet.planner.nlp import stage
 from fleet.planner.problem import Problem
 from fleet.planner.rows import gram
 from fleet.planner.schedule import Itinerary
+from fleet.planner.stages import stage
 from fleet.planner.survey import survey
 from fleet.route import follow
 

@@ -16,6 +16,7 @@ from fleet.planner.setup import setup, warm_start
 from fleet.planner.tradeoff import accelerations, price
 from fleet.scenario import Scenario, load
 from fleet.scenario.tables import Energy
+from tests.bench import reference
 
 #: Least integral of |a|^2 [m^2/s^3] at the same floor that a long IPOPT run over knots and visit times found
 #: for power_tower_energy, peers left out: row "long IPOPT" of `make bench-energy` (tests/bench/reference.py;
@@ -68,6 +69,20 @@ def test_saving_keeps_the_floor_and_never_takes_more_energy(
         v, a = track.bounds()
         assert (v <= scenario.limits.v_max).all()
         assert (a <= scenario.limits.a_max).all()
+
+
+def test_the_yardstick_still_measures(scenario: Scenario) -> None:
+    """One start of the reference program on coarse knots comes close to the stored figure, never below."""
+    task = problem(scenario)
+    guess = reference.routed(task, 0, ("tr3", "tr1"), 0.8)
+    assert guess is not None
+    tour = reference.solve(task, 0, guess, 0.3)
+    assert tour is not None
+    # The drones' halves of the mission mirror each other.
+    assert LONG_IPOPT <= 2 * tour.cost <= 1.02 * LONG_IPOPT
+    finer = reference.refined(tour, 24)
+    assert finer.times[24] == pytest.approx(tour.times[12])
+    assert finer.knots[24] == pytest.approx(tour.knots[12], abs=1e-9)
 
 
 def test_visits_move_to_where_they_cost_least(basic: PlanResult, thrifty: PlanResult) -> None:
