@@ -9,21 +9,18 @@ is a plan; what is not found may still exist.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.optimize import Bounds, LinearConstraint, milp
 
 from .flown import Array
+from .program import Linear, Program, along, plus
 
 Formula = Mapping[str, Any]
-#: A linear expression: coefficients of unknowns, and a constant.
-Linear = tuple[dict[int, float], float]
-
 #: Longest distance of knots [s].
 STEP = 1.0
 #: Directions in which two drones may be apart: faces, edges and corners of a cube.
@@ -64,77 +61,6 @@ class World:
     psi_rate: float
     tube: float
     clauses: Sequence[tuple[str, Formula]]
-
-
-@dataclass
-class Program:
-    """Unknowns with bounds and rows `low <= row <= high`, grown as they are added."""
-
-    low: list[float] = field(default_factory=list)
-    high: list[float] = field(default_factory=list)
-    whole: list[int] = field(default_factory=list)
-    cost: list[float] = field(default_factory=list)
-    rows: list[tuple[dict[int, float], float, float]] = field(default_factory=list)
-
-    def unknown(self, low: float, high: float, whole: bool = False, cost: float = 0.0) -> int:
-        """A new unknown's number."""
-        self.low.append(low)
-        self.high.append(high)
-        self.whole.append(int(whole))
-        self.cost.append(cost)
-        return len(self.low) - 1
-
-    def binary(self) -> int:
-        """A new unknown, 0 or 1."""
-        return self.unknown(0.0, 1.0, whole=True)
-
-    def row(self, expression: Linear, low: float, high: float) -> None:
-        """A new row."""
-        self.rows.append((expression[0], low - expression[1], high - expression[1]))
-
-    def positive(self, expression: Linear, guard: int | None) -> None:
-        """The expression is at least 0, wherever `guard` is 1."""
-        if guard is None:
-            self.row(expression, 0.0, np.inf)
-            return
-        least = expression[1] + sum(min(c * self.low[k], c * self.high[k]) for k, c in expression[0].items())
-        if least < 0:
-            self.row(({**expression[0], guard: least}, expression[1] - least), 0.0, np.inf)
-
-    def some(self, choices: Sequence[int], guard: int | None) -> None:
-        """At least one of some binaries is 1, wherever `guard` is."""
-        coefficients = dict.fromkeys(choices, 1.0)
-        if guard is not None:
-            coefficients[guard] = -1.0
-        self.row((coefficients, 0.0), 1.0 if guard is None else 0.0, np.inf)
-
-    def solve(self, seconds: float) -> Array | None:
-        """Values of the unknowns, or None if none were found in time."""
-        entries = [(i, k, c) for i, (row, _, _) in enumerate(self.rows) for k, c in row.items()]
-        i, k, c = (np.array(column) for column in zip(*entries, strict=True))
-        matrix = sparse.csr_matrix((c, (i, k)), shape=(len(self.rows), len(self.low)))
-        limits = LinearConstraint(matrix, [r[1] for r in self.rows], [r[2] for r in self.rows])
-        options = {"time_limit": seconds, "mip_rel_gap": 0.5}
-        bounds = Bounds(np.array(self.low), np.array(self.high))
-        found = milp(self.cost, integrality=self.whole, bounds=bounds, constraints=limits, options=options)
-        return None if found.x is None else np.asarray(found.x)
-
-
-def plus(a: Linear, b: Linear, factor: float = 1.0) -> Linear:
-    """a + factor b."""
-    out = dict(a[0])
-    for k, c in b[0].items():
-        out[k] = out.get(k, 0.0) + factor * c
-    return out, a[1] + factor * b[1]
-
-
-def along(normal: Array, point: Sequence[Linear]) -> Linear:
-    """normal . point."""
-    out: Linear = ({}, 0.0)
-    for c, axis in zip(normal, point, strict=True):
-        if c:
-            out = plus(out, axis, float(c))
-    return out
 
 
 def negated(f: Formula) -> Formula:
@@ -208,7 +134,7 @@ class Oracle:
             one.row(({self.p[name][0][x]: 1}, 0.0), float(w.starts[name][x]), float(w.starts[name][x]))
         one.row(({self.psi[name][0]: 1}, 0.0), w.psi[name], w.psi[name])
         for face in w.regions[f"home.{name}"]:
-            one.positive(self.inside(name, face, n - 1, 3 - 3)[0], None)
+            one.positive(self.inside(name, face, n - 1, over=False)[0], None)
 
     def points(self, name: str, k: int, over: bool) -> list[list[Linear]]:
         """The position at knot k, or the four Bernstein points of the segment after it."""
@@ -221,10 +147,10 @@ class Oracle:
         third: list[Linear] = [({p[k + 1][x]: 1.0, v[k + 1][x]: -h}, 0.0) for x in range(3)]
         return [first, second, third, [({p[k + 1][x]: 1.0}, 0.0) for x in range(3)]]
 
-    def inside(self, name: str, face: Array, k: int, over: bool | int) -> list[Linear]:
+    def inside(self, name: str, face: Array, k: int, over: bool) -> list[Linear]:
         """What is left of one face beyond the tube, of each point."""
         room = float(face[3]) - self.world.tube
-        return [plus(({}, room), along(face[:3], p), -1.0) for p in self.points(name, k, bool(over))]
+        return [plus(({}, room), along(face[:3], p), -1.0) for p in self.points(name, k, over)]
 
     # -- formulas --------------------------------------------------------------------------------
 
@@ -365,8 +291,6 @@ class Oracle:
 
     def search(self, seconds: float, rounds: int = 25) -> Array | None:
         """Unknowns that keep everything, or None; `seconds` for each round of at most `rounds`."""
-        import time
-
         began = time.monotonic()
         for _ in range(rounds):
             left = seconds - (time.monotonic() - began)
@@ -434,8 +358,3 @@ def knot_times(world: World, step: float) -> Array:
         np.linspace(a, b, int(np.ceil((b - a) / step - 1e-9)), endpoint=False) for a, b in pairwise(fixed)
     ]
     return np.append(np.concatenate(parts), world.horizon)
-
-
-def pairs_of(world: World) -> list[tuple[str, str]]:
-    """All pairs of drones."""
-    return list(combinations(world.drones, 2))
