@@ -20,7 +20,11 @@ def world_config(scenario: Scenario) -> str:
     return _toml(
         seed=scenario.mission.seed,
         fleet=scenario.mission.fleet,
-        wind=list(scenario.wind.velocity),
+        wind={"velocity": list(scenario.wind.velocity), "turbulence": scenario.wind.turbulence},
+        gusts=[
+            {"t": gust.t, "duration": gust.duration, "velocity": list(gust.velocity)}
+            for gust in scenario.gusts
+        ],
         pads={drone.id: ([float(x) for x in drone.pad], drone.pad_heading) for drone in scenario.drones},
         pulses=[
             {"drone": one.drone, "t": one.t, "duration": one.duration, "force": list(one.force)}
@@ -36,7 +40,8 @@ def world_of_plan(plan: Mapping[str, Any]) -> str:
     return _toml(
         seed=plan["seed"],
         fleet=plan["fleet"],
-        wind=[0.0, 0.0, 0.0],
+        wind={"velocity": [0.0, 0.0, 0.0]},
+        gusts=[],
         pads={drone["id"]: (list(drone["pad"]["p"]), drone["pad"]["psi"]) for drone in plan["drones"]},
         pulses=[],
         obstacles=[{"name": name, "faces": list(shapes[name])} for name in plan["obstacles"]],
@@ -47,7 +52,8 @@ def _toml(
     *,
     seed: int,
     fleet: str,
-    wind: list[float],
+    wind: dict[str, Any],
+    gusts: list[dict[str, Any]],
     pads: Mapping[str, tuple[list[float], float]],
     pulses: list[dict[str, Any]],
     obstacles: list[dict[str, Any]],
@@ -65,7 +71,8 @@ def _toml(
         }
         for k, (drone, (pad, psi)) in enumerate(pads.items())
     ]
-    world: dict[str, Any] = {"seed": seed, "fleet": fleet, "wind": {"velocity": wind}, "vehicle": vehicles}
+    world: dict[str, Any] = {"seed": seed, "fleet": fleet, "wind": wind, "vehicle": vehicles}
+    world |= {"gust": gusts} if gusts else {}
     world |= {"pulse": pulses} if pulses else {}
     world |= {"obstacle": obstacles} if obstacles else {}
     return tomli_w.dumps(world)

@@ -1,7 +1,8 @@
 //! What the simulator itself writes to the log: ground truth and crashes.
 
-use crate::world::{Crash, World};
-use fleet_agent::record::{EventMessage, PoseMessage, RecordError, Recorder, SchemaName};
+use crate::world::{Crash, Vehicle};
+use fleet_agent::record::{EventMessage, Log, PoseMessage, RecordError, SchemaName};
+use fleet_core::types::Nanos;
 use fleet_core::wire::{Event, EventKind};
 
 /// Period of the ground truth [ns]: exactly 100 Hz of simulated time.
@@ -22,39 +23,30 @@ impl TruthMessage {
     ///
     /// # Errors
     /// When the log cannot be written.
-    pub fn record(&self, recorder: &mut Recorder) -> Result<(), RecordError> {
-        recorder.json(&self.topic, SchemaName::Pose, self.at_ns, &self.message)
+    pub fn record(&self, log: &mut impl Log) -> Result<(), RecordError> {
+        log.json(&self.topic, SchemaName::Pose, self.at_ns, &self.message)
     }
 }
 
-/// `/{drone}/truth` of every vehicle when it is due, else nothing. `at_ns` is the world's time on the
-/// log's clock.
-pub fn truth(world: &World, at_ns: u64) -> impl Iterator<Item = TruthMessage> + '_ {
-    let due = world.now().0.is_multiple_of(TRUTH_PERIOD);
-    let t = world.mission_time();
-    world.vehicles().iter().filter(move |_| due).map(move |vehicle| {
+/// `/{drone}/truth` of a vehicle at `now` when it is due, else nothing. `at_ns` is `now` on the log's
+/// clock.
+#[must_use]
+pub fn truth(vehicle: &Vehicle, now: Nanos, mission_time: Option<f64>, at_ns: u64) -> Option<TruthMessage> {
+    now.0.is_multiple_of(TRUTH_PERIOD).then(|| {
         let truth = vehicle.truth();
         TruthMessage {
             topic: format!("/{}/truth", vehicle.id()),
             at_ns,
-            message: PoseMessage::motion(at_ns, truth.p, truth.v, truth.q, truth.w, t),
+            message: PoseMessage::motion(at_ns, truth.p, truth.v, truth.q, truth.w, mission_time),
         }
     })
-}
-
-/// Writes what [`truth`] gives.
-///
-/// # Errors
-/// When the log cannot be written.
-pub fn record_truth(recorder: &mut Recorder, world: &World, at_ns: u64) -> Result<(), RecordError> {
-    truth(world, at_ns).try_for_each(|message| message.record(recorder))
 }
 
 /// Writes a crash to `/event`.
 ///
 /// # Errors
 /// When the log cannot be written.
-pub fn record_crash(recorder: &mut Recorder, crash: &Crash, at_ns: u64) -> Result<(), RecordError> {
+pub fn record_crash(log: &mut impl Log, crash: &Crash, at_ns: u64) -> Result<(), RecordError> {
     let text = format!("crash: {} at ({:.2}, {:.2}, {:.2})", crash.what, crash.p.x, crash.p.y, crash.p.z);
     let event = Event {
         drone: crash.drone.clone(),
@@ -63,5 +55,5 @@ pub fn record_crash(recorder: &mut Recorder, crash: &Crash, at_ns: u64) -> Resul
         cause: "seen by the simulator".into(),
     };
     let message = EventMessage::new(at_ns, &crash.drone, &event);
-    recorder.json("/event", SchemaName::Event, at_ns, &message)
+    log.json("/event", SchemaName::Event, at_ns, &message)
 }

@@ -55,6 +55,9 @@ enum Command {
         /// Fly without onboard replanning, whatever the plan says.
         #[arg(long)]
         no_replan: bool,
+        /// Threads that fly vehicles; as many as there are cores unless given. The log is the same.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
     },
 }
 
@@ -70,8 +73,11 @@ fn main() -> ExitCode {
         Command::Run { config, log, exit_when_landed } => {
             read_config(&config).and_then(|world| realtime::run(&world, log.as_deref(), exit_when_landed))
         }
-        Command::Virtual { config, plan, log, no_replan } => read_config(&config)
-            .and_then(|world| virtual_command::run(&world, &plan, log.as_deref(), no_replan)),
+        Command::Virtual { config, plan, log, no_replan, threads } => virtual_command::use_threads(threads)
+            .and_then(|()| {
+                let world = read_config(&config)?;
+                virtual_command::run(&world, &plan, log.as_deref(), no_replan)
+            }),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -29,6 +29,18 @@ struct Done {
     end: BTreeMap<String, End>,
 }
 
+/// Sets how many threads fly vehicles, this one among them; all cores for none.
+///
+/// # Errors
+/// When the system gives no threads.
+pub fn use_threads(threads: Option<u16>) -> Result<(), Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.map_or(0, usize::from))
+        .use_current_thread()
+        .build_global()
+        .map_err(|error| Failure::Environment(format!("cannot start threads: {error}")))
+}
+
 /// Flies `plan` in the world and writes the log.
 ///
 /// # Errors

@@ -71,6 +71,16 @@ def test_the_world_of_a_scenario() -> None:
     assert (world["seed"], world["fleet"]) == (scenario.mission.seed, scenario.mission.fleet)
 
 
+def test_the_world_has_the_scenarios_air(tmp_path: Path) -> None:
+    air = "[wind]\nvelocity = [3.0, 1.0, 0.0]\nturbulence = 4.0\n"
+    gust = "[[gust]]\nt = 10.0\nduration = 2.5\nvelocity = [0.0, 6.0, 0.0]\n"
+    path = tmp_path / "windy.toml"
+    path.write_text(f"{(SCENARIOS / 'hover.toml').read_text()}\n{air}{gust}")
+    world = tomllib.loads(world_config(load(path)))
+    assert world["wind"] == {"velocity": [3.0, 1.0, 0.0], "turbulence": 4.0}
+    assert world["gust"] == [{"t": 10.0, "duration": 2.5, "velocity": [0.0, 6.0, 0.0]}]
+
+
 def test_a_failed_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "x.plan.cbor"
     files.write_atomic(path, b"old")

@@ -7,7 +7,7 @@
 
 use fleet_agent::io::{Output, Stream, Tick, VehicleCmd, VehicleMode};
 use fleet_agent::mavlink::Codec;
-use fleet_agent::record::{Recorder, SchemaName, record_outputs};
+use fleet_agent::record::{Log, Recorder, SchemaName, record_outputs};
 use fleet_core::types::{Nanos, Quat, Reference, Setpoint, State, Vec3};
 use fleet_core::wire::{Event, EventKind, Mode, ReplanNotice, ReplanOutcome, Up};
 use serde::Serialize;
@@ -121,7 +121,7 @@ fn write_log(path: &Path) {
     for step in 1..=3_u64 {
         let at_ns = 1_000_000_000 + step * 10_000_000;
         record_outputs(&mut recorder, "d1", Nanos(at_ns), at_ns, &outputs(Nanos(at_ns))).unwrap();
-        recorder.cbor("/d1/inbox", at_ns, &[0x83, 1, 2, 3]).unwrap();
+        recorder.cbor("/d1/inbox", at_ns, vec![0x83, 1, 2, 3]).unwrap();
     }
     recorder.finish().unwrap();
 }

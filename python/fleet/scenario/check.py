@@ -142,6 +142,10 @@ def _disturbances(tables: Tables, problems: Problems) -> None:
         if tables.mission is not None and entry.t > tables.mission.T:
             message = f"{entry.t:g} s is not legal; must be from 0 to T = {tables.mission.T:g} s"
             problems.add("value", f"disturbance[{i}].t", message)
+    for i, gust in tables.gusts.items():
+        if tables.mission is not None and gust.t > tables.mission.T:
+            message = f"{gust.t:g} s is not legal; must be from 0 to T = {tables.mission.T:g} s"
+            problems.add("value", f"gust[{i}].t", message)
 
 
 def _assignment(tables: Tables, problems: Problems) -> None:

@@ -84,6 +84,7 @@ def _scenario(name: str, tables: Tables, placed: Placement) -> Scenario:
         named=list(placed.named.values()),
         drones=list(placed.drones.values()),
         disturbances=list(tables.disturbances.values()),
+        gusts=list(tables.gusts.values()),
         wind=tables.wind,
         assignment=tables.assignment,
     )

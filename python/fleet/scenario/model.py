@@ -8,7 +8,7 @@ from typing import Any
 
 from fleet.scenario.polyhedron import Array
 from fleet.scenario.region import Region
-from fleet.scenario.tables import Disturbance, Energy, Limits, Mission, Planner, Replan, Wind
+from fleet.scenario.tables import Disturbance, Energy, Gust, Limits, Mission, Planner, Replan, Wind
 from fleet.stl import Clause, Vocabulary, default_formula, parse
 
 
@@ -65,6 +65,7 @@ class Scenario:
     named: list[Region]
     drones: list[Drone]
     disturbances: list[Disturbance]
+    gusts: list[Gust]
     wind: Wind
     assignment: dict[str, list[str]] | None
 

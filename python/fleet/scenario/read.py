@@ -16,7 +16,7 @@ from fleet.scenario import tables
 T = TypeVar("T", bound=BaseModel)
 
 SINGLE = ("mission", "workspace", "limits", "replan", "planner", "energy", "wind", "assignment")
-REPEATED = ("obstacle", "target", "region", "drone", "disturbance")
+REPEATED = ("obstacle", "target", "region", "drone", "disturbance", "gust")
 
 
 class Problems:
@@ -57,6 +57,7 @@ class Tables:
         self.regions = self._many("region", tables.NamedRegion)
         self.drones = self._many("drone", tables.DroneTable)
         self.disturbances = self._many("disturbance", tables.Disturbance)
+        self.gusts = self._many("gust", tables.Gust)
         self.assignment = self._assignment()
 
     def entries(self, key: str) -> int:

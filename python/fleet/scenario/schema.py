@@ -11,6 +11,7 @@ from fleet.scenario.tables import (
     Disturbance,
     DroneTable,
     Energy,
+    Gust,
     Limits,
     Mission,
     NamedRegion,
@@ -44,6 +45,7 @@ class Document(Table):
     region: list[NamedRegion] = Field(default_factory=list)
     drone: list[DroneTable] = Field(min_length=1, max_length=64)
     disturbance: list[Disturbance] = Field(default_factory=list)
+    gust: list[Gust] = Field(default_factory=list)
     assignment: dict[str, list[str]] = Field(
         default_factory=dict, description="Targets of each drone, in order, by hand."
     )

@@ -215,6 +215,15 @@ class Disturbance(Table):
 
 
 class Wind(Table):
-    """`[wind]`: steady wind [m/s; world]."""
+    """`[wind]`: steady wind [m/s; world], and Dryden turbulence for a wind of so much at 20 ft [m/s]."""
 
     velocity: Vec3 = (0.0, 0.0, 0.0)
+    turbulence: float = Field(0.0, ge=0, le=50)
+
+
+class Gust(Table):
+    """`[[gust]]`: swells and fades as 1 - cos from mission time t, over all drones; velocity [m/s; world]."""
+
+    t: float = Field(ge=0)
+    duration: float = Field(gt=0, le=600)
+    velocity: Vec3

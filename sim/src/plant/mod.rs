@@ -62,6 +62,12 @@ impl Plant {
         &self.truth
     }
 
+    /// Height above the ground [m].
+    #[must_use]
+    pub fn height(&self) -> f64 {
+        self.truth.p.z - self.ground
+    }
+
     /// The constants.
     #[must_use]
     pub fn airframe(&self) -> &Airframe {

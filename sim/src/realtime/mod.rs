@@ -99,7 +99,10 @@ fn advance(world: &mut World, clock: &mut Clock, recording: Option<&Recording>) 
             return Ok(());
         }
         if let Some(recording) = recording {
-            for message in log::truth(world, clock.unix_base + world.now().0) {
+            let (now, t) = (world.now(), world.mission_time());
+            for message in
+                world.vehicles().iter().filter_map(|v| log::truth(v, now, t, clock.unix_base + now.0))
+            {
                 recording.write(Entry::Truth(message))?;
             }
         }

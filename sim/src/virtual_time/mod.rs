@@ -1,6 +1,7 @@
 //! A whole flight in one process on virtual time: real [`Agent::step`](fleet_agent::Agent::step),
 //! real MAVLink bytes, real plant; no socket, no clock, the same bytes of log for the same seed.
 
+mod craft;
 mod ground;
 mod mail;
 mod onboard;
@@ -8,12 +9,14 @@ mod onboard;
 use crate::log;
 use crate::world::{ConfigError, Vehicle};
 use crate::world::{End, STEP, World, WorldConfig};
-use fleet_agent::record::{InboxError, MissionMessage, RecordError, Recorder, SchemaName};
+use craft::Window;
+use fleet_agent::record::{InboxError, Log, MissionMessage, RecordError, Recorder, SchemaName};
 use fleet_core::replan::ReplanError;
 use fleet_core::types::Nanos;
 use fleet_core::wire::{DecodeError, Plan, Status, Up};
 use ground::Ground;
-use onboard::Onboard;
+use onboard::{Onboard, Published, RADIO};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -21,6 +24,8 @@ use thiserror::Error;
 pub const EPOCH: u64 = 1_000_000_000;
 /// After the end of the mission, flights may last this long [s].
 const OVERTIME: f64 = 90.0;
+/// Fewer vehicles are flown faster by one thread.
+const WORTH_THREADS: usize = 4;
 /// Disarmed for so long is the end of a flight [s].
 const SETTLED: f64 = 1.0;
 
@@ -154,33 +159,36 @@ impl VirtualFlight {
         })
     }
 
-    /// One period of the physics and whatever is due in it; gives what the drones published.
+    /// Flies until news can arrive: at most [`RADIO`], in which every craft is on its own, and one period
+    /// of the physics when two are so near that they could touch. Gives what the drones published.
     ///
     /// # Errors
     /// When a drone refuses or the log cannot be written.
     pub fn step(&mut self, mut recorder: Option<&mut Recorder>) -> Result<Vec<Up>, VirtualError> {
-        let now = self.clock();
-        if let Some(recorder) = recorder.as_deref_mut() {
-            log::record_truth(recorder, &self.world, now.0)?;
-        }
-        for (onboard, vehicle) in self.onboard.iter_mut().zip(self.world.vehicles_mut()) {
-            onboard.exchange(now, vehicle);
-        }
+        let start = self.world.now();
+        let time = if self.world.apart_for(RADIO) { RADIO - start.0 % RADIO } else { STEP };
         let mut heard = Vec::new();
-        for i in 0..self.onboard.len() {
-            let published = self.onboard[i].step(now, recorder.as_deref_mut())?;
-            for message in published {
-                self.share(now, i, &message);
-                heard.push(message.message);
+        for (i, mut window) in self.windows(start, time, recorder.is_some()).into_iter().enumerate() {
+            if let Some(recorder) = recorder.as_deref_mut() {
+                window.log.drain_to(recorder)?;
             }
+            if let Some(failure) = window.failure {
+                return Err(failure);
+            }
+            heard.extend(window.published.into_iter().map(|published| (i, published)));
         }
-        self.run_ground(now, recorder.as_deref_mut())?;
-        for crash in self.world.step() {
+        for crash in self.world.pass(time) {
             if let Some(recorder) = recorder.as_deref_mut() {
                 log::record_crash(recorder, &crash, crash.at.0 + EPOCH)?;
             }
         }
-        Ok(heard)
+        heard.sort_by_key(|(_, published)| published.at);
+        let now = Nanos(start.0 + EPOCH + time - STEP);
+        for (i, published) in &heard {
+            self.share(*i, published);
+        }
+        self.run_ground(now, recorder)?;
+        Ok(heard.into_iter().map(|(_, published)| published.message).collect())
     }
 
     /// Another ground session's message for `drone`: an envelope, as it comes over the wire. False
@@ -207,19 +215,35 @@ impl VirtualFlight {
         Nanos(self.world.now().0 + EPOCH)
     }
 
+    /// Every craft's window of `time` [ns] from `start` on, in their order.
+    fn windows(&mut self, start: Nanos, time: u64, logged: bool) -> Vec<Window> {
+        let span = (start, time / STEP);
+        let (environment, vehicles) = self.world.split();
+        let fly = |(onboard, vehicle): (&mut Onboard, &mut Vehicle)| {
+            let mut window = Window::default();
+            window.fly(onboard, vehicle, environment, span, logged);
+            window
+        };
+        if vehicles.len() < WORTH_THREADS || rayon::current_num_threads() == 1 {
+            return self.onboard.iter_mut().zip(vehicles).map(fly).collect();
+        }
+        self.onboard.par_iter_mut().zip(vehicles).map(fly).collect()
+    }
+
     /// Gives one drone's message to the ground and, if peers listen to it, to the others.
-    fn share(&mut self, now: Nanos, from: usize, published: &onboard::Published) {
+    fn share(&mut self, from: usize, published: &Published) {
         self.ground.hear(&published.message);
         if !published.for_peers {
             return;
         }
         for (i, onboard) in self.onboard.iter_mut().enumerate() {
             if i != from {
-                onboard.post_peer(now, published.bytes.clone());
+                onboard.post_peer(published.at, published.bytes.clone());
             }
         }
     }
 
+    /// The ground's turn at `now` of the agents' clock.
     fn run_ground(&mut self, now: Nanos, recorder: Option<&mut Recorder>) -> Result<(), VirtualError> {
         let statuses: Vec<_> = self.onboard.iter().map(Onboard::status).collect();
         let Some(orders) = self.ground.step(now, &statuses)? else { return Ok(()) };

@@ -7,7 +7,7 @@ use crate::framing::{Encoder, deliver};
 use crate::world::Vehicle;
 use fleet_agent::io::{Input, Output, PLAN_FILE};
 use fleet_agent::mavlink::Codec;
-use fleet_agent::record::{InboxError, Recorder, StepRecord, record_config, record_outputs, record_step};
+use fleet_agent::record::{Batch, InboxError, Log, StepRecord, record_config, record_outputs, record_step};
 use fleet_agent::{Agent, AgentConfig, SolveResult};
 use fleet_core::replan::Replanner;
 use fleet_core::types::Nanos;
@@ -20,7 +20,7 @@ const PHASE: u64 = 2_000_000;
 /// One way over the MAVLink link [ns].
 const SERIAL: u64 = 1_000_000;
 /// One way over the radio between drones and ground [ns].
-const RADIO: u64 = 5_000_000;
+pub(super) const RADIO: u64 = 5_000_000;
 /// What a solve takes [ns] (design.md, Principles 1).
 const SOLVE: u64 = 20_000_000;
 /// The agent's link; answers to other clients are not for it.
@@ -35,6 +35,8 @@ pub struct Published {
     pub message: Up,
     /// Whether peers listen to it.
     pub for_peers: bool,
+    /// When it was sent, on the agent's clock.
+    pub at: Nanos,
 }
 
 /// An agent and what surrounds it.
@@ -85,8 +87,8 @@ impl Onboard {
     }
 
     /// Writes the configuration that a replay needs.
-    pub fn record_config(&self, recorder: &mut Recorder, at_ns: u64) -> Result<(), InboxError> {
-        record_config(recorder, &self.config, at_ns)
+    pub fn record_config(&self, log: &mut impl Log, at_ns: u64) -> Result<(), InboxError> {
+        record_config(log, &self.config, at_ns)
     }
 
     /// A message from the ground.
@@ -116,11 +118,7 @@ impl Onboard {
     ///
     /// # Errors
     /// When the log cannot be written or the committed plan does not suit the replanner.
-    pub fn step(
-        &mut self,
-        now: Nanos,
-        recorder: Option<&mut Recorder>,
-    ) -> Result<Vec<Published>, VirtualError> {
+    pub fn step(&mut self, now: Nanos, log: Option<&mut Batch>) -> Result<Vec<Published>, VirtualError> {
         while let Some(bytes) = self.from_vehicle.take(now) {
             self.inbox.extend(self.codec.decode(&bytes).into_iter().map(Input::Vehicle));
         }
@@ -135,10 +133,10 @@ impl Onboard {
         }
         let inbox = std::mem::take(&mut self.inbox);
         let outputs = self.agent.step(now, &inbox);
-        if let Some(recorder) = recorder {
-            record_outputs(recorder, &self.id, now, now.0, &outputs)?;
+        if let Some(log) = log {
+            record_outputs(log, &self.id, now, now.0, &outputs)?;
             let step = StepRecord::new(now, inbox, &outputs)?;
-            record_step(recorder, &self.id, now.0, &step)?;
+            record_step(log, &self.id, now.0, &step)?;
         }
         self.execute(now, outputs)
     }
@@ -153,7 +151,7 @@ impl Onboard {
                 }
                 Output::Publish { bytes, message } => {
                     let for_peers = matches!(*message, Up::Heartbeat(_) | Up::Replan(_));
-                    published.push(Published { bytes, message: *message, for_peers });
+                    published.push(Published { bytes, message: *message, for_peers, at: now });
                 }
                 Output::Solve(request) => {
                     // A request without a committed plan cannot be; were it one, it would go unanswered.

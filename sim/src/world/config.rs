@@ -22,6 +22,9 @@ pub struct WorldConfig {
     /// The vehicles.
     #[serde(rename = "vehicle")]
     pub vehicles: Vec<VehicleConfig>,
+    /// Single gusts.
+    #[serde(default, rename = "gust")]
+    pub gusts: Vec<Gust>,
     /// Force pulses.
     #[serde(default, rename = "pulse")]
     pub pulses: Vec<Pulse>,
@@ -30,13 +33,40 @@ pub struct WorldConfig {
     pub obstacles: Vec<Obstacle>,
 }
 
-/// Steady wind.
+/// Wind that blows all the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wind {
-    /// Velocity of the air [m/s; ENU].
+    /// Mean velocity of the air [m/s; ENU].
     #[serde(default)]
     pub velocity: Vec3,
+    /// Dryden turbulence for this wind speed at 20 ft [m/s]; 0 is none.
+    #[serde(default)]
+    pub turbulence: f64,
+}
+
+/// A gust that swells and fades as `1 - cos` (EASA CS-25.341) over all vehicles.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gust {
+    /// Mission time at which it begins [s].
+    pub t: f64,
+    /// How long it lasts [s].
+    pub duration: f64,
+    /// Velocity that it adds to the wind at its height [m/s; ENU].
+    pub velocity: Vec3,
+}
+
+impl Gust {
+    /// What it adds to the wind at mission time `t` [m/s; ENU].
+    #[must_use]
+    pub fn at(&self, t: f64) -> Vec3 {
+        let share = (t - self.t) / self.duration;
+        if !(0.0..=1.0).contains(&share) {
+            return Vec3::zeros();
+        }
+        0.5 * (1.0 - (std::f64::consts::TAU * share).cos()) * self.velocity
+    }
 }
 
 /// One vehicle.
@@ -144,6 +174,18 @@ impl WorldConfig {
             }
             if let Some(hit) = self.obstacles.iter().find(|o| o.faces.inside(&v.pad) >= 0.0) {
                 return refuse(format!("vehicle[{i}].pad"), format!("lies inside obstacle {:?}", hit.name));
+            }
+        }
+        let blows = |v: f64| v.is_finite() && v >= 0.0;
+        if !(finite(&self.wind.velocity) && blows(self.wind.turbulence)) {
+            let problem = "velocity must be finite, turbulence finite and not negative";
+            return refuse("wind".into(), problem.into());
+        }
+        for (i, g) in self.gusts.iter().enumerate() {
+            let sound = g.t.is_finite() && g.duration.is_finite() && g.duration > 0.0;
+            if !(sound && finite(&g.velocity)) {
+                let problem = "t and velocity must be finite, duration positive";
+                return refuse(format!("gust[{i}]"), problem.into());
             }
         }
         for (i, p) in self.pulses.iter().enumerate() {

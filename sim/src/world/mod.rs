@@ -1,30 +1,31 @@
 //! The world: n vehicles, wind, force pulses, obstacles and the ground truth.
 
 mod config;
+mod environment;
+mod turbulence;
 mod vehicle;
 
-pub use config::{ConfigError, Obstacle, Pulse, VehicleConfig, Wind, WorldConfig};
+pub use config::{ConfigError, Gust, Obstacle, Pulse, VehicleConfig, Wind, WorldConfig};
+pub use environment::Environment;
 pub use vehicle::{Crash, End, Vehicle};
 
 use crate::autopilot::{Autopilot, ParamError, Params};
-use crate::plant::{Airframe, DT, Plant};
-use fleet_core::types::{Nanos, Vec3};
+use crate::plant::{Airframe, Plant};
+use fleet_core::types::Nanos;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use turbulence::Turbulence;
 
 /// Period of the physics [ns].
 pub const STEP: u64 = 1_000_000;
-/// Touching the ground faster than this is a crash [m/s]: several times PX4's landing speed.
-const HARD_LANDING: f64 = 3.0;
+/// What a vehicle's speed can change by in a few periods at most [m/s].
+const CHANGE: f64 = 1.0;
 
 /// The simulated world.
 #[derive(Clone, Debug)]
 pub struct World {
     now: Nanos,
-    t0: Option<Nanos>,
-    wind: Vec3,
-    pulses: Vec<(usize, Pulse)>,
-    obstacles: Vec<Obstacle>,
+    environment: Environment,
     vehicles: Vec<Vehicle>,
 }
 
@@ -48,18 +49,12 @@ impl World {
             let boot_offset = rng.random_range(1_000_000_000..60_000_000_000);
             let plant = Plant::new(Airframe::F450, v.pad, v.psi);
             let autopilot = Autopilot::new(v.system, plant.truth(), params, boot_offset);
-            vehicles.push(Vehicle::new(v.id.clone(), plant, autopilot));
+            let air_seed = rng.random();
+            let turbulence =
+                (config.wind.turbulence > 0.0).then(|| Turbulence::new(air_seed, config.wind.turbulence));
+            vehicles.push(Vehicle::new(i, v.id.clone(), plant, autopilot, turbulence));
         }
-        let index = |id: &str| config.vehicles.iter().position(|v| v.id == id);
-        let pulses = config.pulses.iter().filter_map(|p| index(&p.drone).map(|i| (i, p.clone()))).collect();
-        Ok(Self {
-            now: Nanos(0),
-            t0: None,
-            wind: config.wind.velocity,
-            pulses,
-            obstacles: config.obstacles.clone(),
-            vehicles,
-        })
+        Ok(Self { now: Nanos(0), environment: Environment::new(config), vehicles })
     }
 
     /// Simulated time since launch.
@@ -70,13 +65,13 @@ impl World {
 
     /// Sets mission time 0 on the clock of [`World::now`].
     pub fn set_t0(&mut self, t0: Nanos) {
-        self.t0 = Some(t0);
+        self.environment.set_t0(t0);
     }
 
     /// Mission time [s], when a start is known.
     #[must_use]
     pub fn mission_time(&self) -> Option<f64> {
-        self.t0.map(|t0| self.now.since(t0))
+        self.environment.mission_time(self.now)
     }
 
     /// The vehicles in order of the configuration.
@@ -92,54 +87,54 @@ impl World {
 
     /// One period of the physics. Gives the crashes that happened in it.
     pub fn step(&mut self) -> Vec<Crash> {
-        let mission_time = self.mission_time();
-        for (i, vehicle) in self.vehicles.iter_mut().enumerate() {
-            let force = match mission_time {
-                Some(t) => pulse_force(&self.pulses, i, t),
-                None => Vec3::zeros(),
-            };
-            vehicle.step(self.now, &self.wind, &force, DT);
-        }
-        self.now.0 += STEP;
-        self.find_crashes()
-    }
-
-    fn find_crashes(&mut self) -> Vec<Crash> {
         let mut crashes = Vec::new();
-        for i in 0..self.vehicles.len() {
-            let p = self.vehicles[i].truth().p;
-            let impact = self.vehicles[i].take_impact().filter(|speed| *speed > HARD_LANDING);
-            let what = if let Some(speed) = impact {
-                Some(format!("hit the ground at {speed:.1} m/s"))
-            } else if let Some(o) = self.obstacles.iter().find(|o| o.faces.inside(&p) >= 0.0) {
-                Some(format!("touched obstacle {}", o.name))
-            } else {
-                self.touching(i).map(|other| format!("touched {other}"))
-            };
-            let (now, t) = (self.now, self.mission_time());
-            if let Some(what) = what {
-                crashes.extend(self.vehicles[i].crash(now, t, what));
-            }
+        for vehicle in &mut self.vehicles {
+            crashes.extend(vehicle.step(self.now, &self.environment));
         }
+        crashes.extend(self.pass(STEP));
         crashes
     }
 
-    fn touching(&self, i: usize) -> Option<&str> {
+    /// What the vehicles live in, and the vehicles: to be stepped one by one, each at its own pace,
+    /// from [`World::now`] for as long as [`World::apart_for`] says, before [`World::pass`].
+    pub fn split(&mut self) -> (&Environment, &mut [Vehicle]) {
+        (&self.environment, &mut self.vehicles)
+    }
+
+    /// Whether no two vehicles can touch each other within `time` [ns].
+    #[must_use]
+    pub fn apart_for(&self, time: u64) -> bool {
+        let time = time as f64 * 1e-9;
+        self.vehicles.iter().enumerate().all(|(i, one)| {
+            self.vehicles[..i].iter().all(|other| {
+                let speed = one.truth().v.norm() + other.truth().v.norm() + 2.0 * CHANGE;
+                let span = one.airframe().rotor_span.max(other.airframe().rotor_span);
+                (one.truth().p - other.truth().p).norm() > span + speed * time
+            })
+        })
+    }
+
+    /// Time goes on by `time` [ns], which the vehicles have been stepped for. Gives the crashes of
+    /// vehicles into each other, as they stand now.
+    pub fn pass(&mut self, time: u64) -> Vec<Crash> {
+        self.now.0 += time;
+        let touching: Vec<_> = (0..self.vehicles.len()).map(|i| self.touching(i)).collect();
+        let (now, t) = (self.now, self.mission_time());
+        let crash = |(vehicle, other): (&mut Vehicle, Option<String>)| {
+            other.and_then(|other| vehicle.crash(now, t, format!("touched {other}")))
+        };
+        self.vehicles.iter_mut().zip(touching).filter_map(crash).collect()
+    }
+
+    fn touching(&self, i: usize) -> Option<String> {
         let one = &self.vehicles[i];
         let span = one.airframe().rotor_span;
         self.vehicles
             .iter()
             .enumerate()
             .find(|(j, other)| *j != i && (other.truth().p - one.truth().p).norm() < span)
-            .map(|(_, other)| other.id())
+            .map(|(_, other)| other.id().to_owned())
     }
-}
-
-fn pulse_force(pulses: &[(usize, Pulse)], vehicle: usize, t: f64) -> Vec3 {
-    pulses
-        .iter()
-        .filter(|(i, p)| *i == vehicle && t >= p.t && t < p.t + p.duration)
-        .fold(Vec3::zeros(), |sum, (_, p)| sum + p.force)
 }
 
 #[cfg(test)]

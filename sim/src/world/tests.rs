@@ -1,4 +1,5 @@
 use super::*;
+use fleet_core::types::Vec3;
 
 const WORLD: &str = r#"
 seed = 1
@@ -46,6 +47,8 @@ fn refuses_bad_worlds_by_field() {
         ("id = \"d2\"", "id = \"d1\"", "vehicle[1].id"),
         ("drone = \"d2\"", "drone = \"d9\"", "pulse[0].drone"),
         ("duration = 0.5", "duration = 0.0", "pulse[0]"),
+        ("[[pulse]]", "[[gust]]\nt = 0.0\nduration = -1.0\nvelocity = [1.0, 0.0, 0.0]\n[[pulse]]", "gust[0]"),
+        ("[[vehicle]]\nid = \"d1\"", "[wind]\nturbulence = -1.0\n[[vehicle]]\nid = \"d1\"", "wind"),
         ("127.0.0.1:0", "0.0.0.0:0", "vehicle[1].mavlink"),
         ("pad = [-5.0, -7.0, 0.2]", "pad = [-5.7, 0.0, 0.2]", "vehicle[0].pad"),
         ("COM_OBL_RC_ACT", "COM_OBL_RC_AKT", "vehicle[0].params"),
@@ -78,6 +81,43 @@ fn a_pulse_acts_in_mission_time_on_its_drone() {
     let v = world.vehicles()[1].truth().v.x;
     assert!((0.9 * expected..=expected).contains(&v), "{v} {expected}");
     assert_eq!(world.vehicles()[0].truth().v.x, 0.0);
+}
+
+#[test]
+fn a_gust_swells_and_fades_over_all_vehicles() {
+    let gust = "[[gust]]\nt = 1.0\nduration = 2.0\nvelocity = [0.0, 6.0, 0.0]\n";
+    let world = World::new(&WorldConfig::parse(&format!("{WORLD}{gust}")).unwrap()).unwrap();
+    let mut environment = Environment::new(&WorldConfig::parse(&format!("{WORLD}{gust}")).unwrap());
+    assert_eq!(world.vehicles().len(), 2);
+    assert_eq!(environment.wind(Nanos(2_000_000_000)), Vec3::zeros(), "no start is known");
+    environment.set_t0(Nanos(0));
+    for (t, north) in [(0.9, 0.0), (1.0, 0.0), (1.5, 3.0), (2.0, 6.0), (2.5, 3.0), (3.0, 0.0), (3.1, 0.0)] {
+        let wind = environment.wind(Nanos((t * 1e9) as u64));
+        assert!((wind - Vec3::new(0.0, north, 0.0)).norm() < 1e-6, "{t}: {wind}");
+    }
+}
+
+#[test]
+fn turbulence_differs_from_vehicle_to_vehicle_and_comes_from_the_seed() {
+    let fly = |seed: &str| {
+        let wind = "[wind]\nvelocity = [6.0, 0.0, 0.0]\nturbulence = 8.0\n";
+        let text = WORLD
+            .replace("seed = 1", seed)
+            .replace("[[vehicle]]\nid = \"d1\"", &format!("{wind}[[vehicle]]\nid = \"d1\""));
+        let mut world = World::new(&WorldConfig::parse(&text).unwrap()).unwrap();
+        for i in 0..2 {
+            place(&mut world, i, Vec3::new(0.0, 20.0 * i as f64, 80.0), Vec3::zeros());
+        }
+        for _ in 0..2000 {
+            world.step();
+        }
+        [world.vehicles()[0].truth().v, world.vehicles()[1].truth().v]
+    };
+    let [one, two] = fly("seed = 1");
+    assert!(one.x > 0.1 && two.x > 0.1, "the wind takes both along");
+    assert!((one - two).norm() > 1e-3);
+    assert_eq!([one, two], fly("seed = 1"));
+    assert_ne!([one, two], fly("seed = 2"));
 }
 
 #[test]

@@ -1,9 +1,17 @@
 //! One vehicle of the world: body, autopilot and what became of them.
 
+use super::STEP;
+use super::environment::{ClearBall, Environment};
+use super::turbulence::{PERIOD, Turbulence};
 use crate::autopilot::Autopilot;
-use crate::plant::{Airframe, Plant, Truth};
+use crate::plant::{Airframe, DT, Plant, Truth};
 use fleet_core::types::{Nanos, Vec3};
 use serde::Serialize;
+
+/// Period of the turbulence [ns].
+const TURBULENCE_PERIOD: u64 = (PERIOD * 1e9) as u64;
+/// Touching the ground faster than this is a crash [m/s]: several times PX4's landing speed.
+const HARD_LANDING: f64 = 3.0;
 
 /// Something was touched that must not be.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,17 +47,36 @@ pub enum End {
 /// A vehicle.
 #[derive(Clone, Debug)]
 pub struct Vehicle {
+    index: usize,
     id: String,
     plant: Plant,
     autopilot: Autopilot,
     crash: Option<Crash>,
     was_armed: bool,
     disarmed_at: Nanos,
+    clear: ClearBall,
+    turbulence: Option<Turbulence>,
 }
 
 impl Vehicle {
-    pub(super) fn new(id: String, plant: Plant, autopilot: Autopilot) -> Self {
-        Self { id, plant, autopilot, crash: None, was_armed: false, disarmed_at: Nanos(0) }
+    pub(super) fn new(
+        index: usize,
+        id: String,
+        plant: Plant,
+        autopilot: Autopilot,
+        turbulence: Option<Turbulence>,
+    ) -> Self {
+        Self {
+            index,
+            id,
+            plant,
+            autopilot,
+            crash: None,
+            was_armed: false,
+            disarmed_at: Nanos(0),
+            clear: ClearBall::default(),
+            turbulence,
+        }
     }
 
     /// Drone id.
@@ -122,17 +149,33 @@ impl Vehicle {
         }
     }
 
-    pub(super) fn step(&mut self, now: Nanos, wind: &Vec3, force: &Vec3, dt: f64) {
+    /// One period of the physics from `now` on. Gives the crash that happened in it; touching other
+    /// vehicles is the world's to see.
+    pub fn step(&mut self, now: Nanos, environment: &Environment) -> Option<Crash> {
         let motors = self.autopilot.step(now, self.plant.truth());
         if self.armed() {
             self.was_armed = true;
             self.disarmed_at = now;
         }
-        self.plant.step(motors, wind, force, dt);
+        let force = environment.force(self.index, now);
+        let wind = self.air(now, environment.wind(now));
+        self.plant.step(motors, &wind, &force, DT);
+        let what = match self.plant.take_impact().filter(|speed| *speed > HARD_LANDING) {
+            Some(speed) => format!("hit the ground at {speed:.1} m/s"),
+            None => format!("touched obstacle {}", environment.hit(&self.plant.truth().p, &mut self.clear)?),
+        };
+        let then = Nanos(now.0 + STEP);
+        self.crash(then, environment.mission_time(then), what)
     }
 
-    pub(super) fn take_impact(&mut self) -> Option<f64> {
-        self.plant.take_impact()
+    /// Velocity of the air here [m/s; ENU]: the wind and the turbulence in it.
+    fn air(&mut self, now: Nanos, wind: Vec3) -> Vec3 {
+        let Some(turbulence) = &mut self.turbulence else { return wind };
+        if now.0.is_multiple_of(TURBULENCE_PERIOD) {
+            let truth = self.plant.truth();
+            turbulence.advance(self.plant.height(), (truth.v - wind).norm(), &wind);
+        }
+        wind + turbulence.gust()
     }
 
     /// Notes the first crash and stops the motors for good; later ones change nothing.

@@ -1,6 +1,6 @@
 //! The recorded inbox: what a replay needs to run the same step again.
 
-use super::{RecordError, Recorder};
+use super::{Log, RecordError};
 use crate::io::{Input, Output};
 use crate::{Agent, AgentConfig};
 use fleet_core::types::Nanos;
@@ -77,8 +77,8 @@ pub struct Replay {
 ///
 /// # Errors
 /// When it cannot be encoded or written.
-pub fn record_config(recorder: &mut Recorder, config: &AgentConfig, at_ns: u64) -> Result<(), InboxError> {
-    recorder.cbor(&topic(&config.drone), at_ns, &cbor(config)?)?;
+pub fn record_config(log: &mut impl Log, config: &AgentConfig, at_ns: u64) -> Result<(), InboxError> {
+    log.cbor(&topic(&config.drone), at_ns, cbor(config)?)?;
     Ok(())
 }
 
@@ -86,13 +86,8 @@ pub fn record_config(recorder: &mut Recorder, config: &AgentConfig, at_ns: u64) 
 ///
 /// # Errors
 /// When it cannot be encoded or written.
-pub fn record_step(
-    recorder: &mut Recorder,
-    drone: &str,
-    at_ns: u64,
-    step: &StepRecord,
-) -> Result<(), InboxError> {
-    recorder.cbor(&topic(drone), at_ns, &cbor(step)?)?;
+pub fn record_step(log: &mut impl Log, drone: &str, at_ns: u64, step: &StepRecord) -> Result<(), InboxError> {
+    log.cbor(&topic(drone), at_ns, cbor(step)?)?;
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! The logged messages and how they follow from what a step puts out.
 
-use super::{RecordError, Recorder, SchemaName};
+use super::{Log, RecordError, SchemaName};
 use crate::io::{Output, Tick};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -175,7 +175,7 @@ impl MissionMessage {
 /// # Errors
 /// When the log cannot be written.
 pub fn record_outputs(
-    recorder: &mut Recorder,
+    log: &mut impl Log,
     drone: &str,
     now: Nanos,
     at_ns: u64,
@@ -183,12 +183,12 @@ pub fn record_outputs(
 ) -> Result<(), RecordError> {
     for output in outputs {
         match output {
-            Output::Tick(tick) => record_tick(recorder, drone, now, at_ns, tick)?,
+            Output::Tick(tick) => record_tick(log, drone, now, at_ns, tick)?,
             Output::Publish { message, .. } => match message.as_ref() {
-                Up::Event(event) => record_event(recorder, drone, at_ns, event)?,
+                Up::Event(event) => record_event(log, drone, at_ns, event)?,
                 Up::Replan(notice) => {
                     let message = ReplanMessage { timestamp: at_ns.into(), notice };
-                    recorder.json(&format!("/{drone}/replan"), SchemaName::Replan, at_ns, &message)?;
+                    log.json(&format!("/{drone}/replan"), SchemaName::Replan, at_ns, &message)?;
                 }
                 Up::Heartbeat(_) | Up::Telemetry(_) | Up::Ack(_) => {}
             },
@@ -199,7 +199,7 @@ pub fn record_outputs(
 }
 
 fn record_tick(
-    recorder: &mut Recorder,
+    log: &mut impl Log,
     drone: &str,
     now: Nanos,
     at_ns: u64,
@@ -211,7 +211,7 @@ fn record_tick(
         let measured_ns = at_ns.saturating_sub((age * 1e9).round() as u64);
         let mission_time = tick.mission_time.map(|t| t - age);
         let message = PoseMessage::motion(measured_ns, state.p, state.v, state.q, state.w, mission_time);
-        recorder.json(&format!("/{drone}/state"), SchemaName::Pose, at_ns, &message)?;
+        log.json(&format!("/{drone}/state"), SchemaName::Pose, at_ns, &message)?;
     }
     if let Some(reference) = &tick.reference {
         let message = PoseMessage::reference(
@@ -222,7 +222,7 @@ fn record_tick(
             reference.psi,
             tick.mission_time,
         );
-        recorder.json(&format!("/{drone}/reference"), SchemaName::Pose, at_ns, &message)?;
+        log.json(&format!("/{drone}/reference"), SchemaName::Pose, at_ns, &message)?;
     }
     if let Some(setpoint) = &tick.setpoint {
         let message = SetpointMessage {
@@ -233,14 +233,14 @@ fn record_tick(
             deviation: tick.deviation,
             mission_time: tick.mission_time,
         };
-        recorder.json(&format!("/{drone}/setpoint"), SchemaName::Setpoint, at_ns, &message)?;
+        log.json(&format!("/{drone}/setpoint"), SchemaName::Setpoint, at_ns, &message)?;
     }
     Ok(())
 }
 
-fn record_event(recorder: &mut Recorder, drone: &str, at_ns: u64, event: &Event) -> Result<(), RecordError> {
+fn record_event(log: &mut impl Log, drone: &str, at_ns: u64, event: &Event) -> Result<(), RecordError> {
     let message = EventMessage::new(at_ns, drone, event);
-    recorder.json("/event", SchemaName::Event, at_ns, &message)?;
+    log.json("/event", SchemaName::Event, at_ns, &message)?;
     if let EventKind::Mode { to, .. } = event.kind {
         let message = ModeMessage {
             timestamp: at_ns.into(),
@@ -248,7 +248,7 @@ fn record_event(recorder: &mut Recorder, drone: &str, at_ns: u64, event: &Event)
             cause: &event.cause,
             mission_time: event.mission_time,
         };
-        recorder.json(&format!("/{drone}/mode"), SchemaName::Mode, at_ns, &message)?;
+        log.json(&format!("/{drone}/mode"), SchemaName::Mode, at_ns, &message)?;
     }
     Ok(())
 }

@@ -3,10 +3,12 @@
 //! Log and publish time are whatever clock the caller counts in: Unix time in real flight, virtual
 //! time in a simulation. The same calls in the same order give the same bytes.
 
+mod batch;
 mod inbox;
 mod messages;
 mod schema;
 
+pub use batch::Batch;
 pub use inbox::{InboxError, Replay, StepRecord, record_config, record_step, replay};
 pub use messages::{
     EventMessage, MissionMessage, ModeMessage, Pose, PoseMessage, Position, ReplanMessage, SetpointMessage,
@@ -43,15 +45,52 @@ pub enum RecordError {
         source: McapError,
     },
     /// A message could not be turned into bytes.
-    #[error("{path}: message on {topic} cannot be encoded: {reason}")]
+    #[error("message on {topic} cannot be encoded: {reason}")]
     Encode {
-        /// The file.
-        path: PathBuf,
         /// Its topic.
         topic: String,
         /// The encoder's reason.
         reason: String,
     },
+}
+
+/// Where messages are logged to: a file, or a batch that goes to one later.
+pub trait Log {
+    /// Logs one JSON message; the first one on a topic fixes the topic's schema.
+    ///
+    /// # Errors
+    /// When the message cannot be encoded or written.
+    fn json(
+        &mut self,
+        topic: &str,
+        schema: SchemaName,
+        at_ns: u64,
+        message: &impl Serialize,
+    ) -> Result<(), RecordError> {
+        let data = serde_json::to_vec(message)
+            .map_err(|error| RecordError::Encode { topic: topic.to_owned(), reason: error.to_string() })?;
+        self.write(topic, Some(schema), at_ns, data)
+    }
+
+    /// Logs one CBOR message on a topic without schema.
+    ///
+    /// # Errors
+    /// When the message cannot be written.
+    fn cbor(&mut self, topic: &str, at_ns: u64, data: Vec<u8>) -> Result<(), RecordError> {
+        self.write(topic, None, at_ns, data)
+    }
+
+    /// Logs the bytes of one message.
+    ///
+    /// # Errors
+    /// When the message cannot be written.
+    fn write(
+        &mut self,
+        topic: &str,
+        schema: Option<SchemaName>,
+        at_ns: u64,
+        data: Vec<u8>,
+    ) -> Result<(), RecordError>;
 }
 
 #[derive(Debug)]
@@ -95,33 +134,6 @@ impl Recorder {
         Ok(Self { path, writer, file: clone, channels: BTreeMap::new() })
     }
 
-    /// Writes one JSON message; the first one on a topic fixes the topic's schema.
-    ///
-    /// # Errors
-    /// When the message cannot be encoded or written.
-    pub fn json(
-        &mut self,
-        topic: &str,
-        schema: SchemaName,
-        at_ns: u64,
-        message: &impl Serialize,
-    ) -> Result<(), RecordError> {
-        let data = serde_json::to_vec(message).map_err(|error| RecordError::Encode {
-            path: self.path.clone(),
-            topic: topic.to_owned(),
-            reason: error.to_string(),
-        })?;
-        self.write(topic, Some(schema), at_ns, &data)
-    }
-
-    /// Writes one CBOR message on a topic without schema.
-    ///
-    /// # Errors
-    /// When the message cannot be written.
-    pub fn cbor(&mut self, topic: &str, at_ns: u64, data: &[u8]) -> Result<(), RecordError> {
-        self.write(topic, None, at_ns, data)
-    }
-
     /// Ends the current chunk and waits until everything is on the disk, so that at most what
     /// follows is lost when the power goes.
     ///
@@ -143,25 +155,6 @@ impl Recorder {
         let file =
             writer.into_inner().into_inner().map_err(|error| failed(McapError::Io(error.into_error())))?;
         file.sync_all().map_err(|error| failed(McapError::Io(error)))
-    }
-
-    fn write(
-        &mut self,
-        topic: &str,
-        schema: Option<SchemaName>,
-        at_ns: u64,
-        data: &[u8],
-    ) -> Result<(), RecordError> {
-        let channel_id = match self.channels.get_mut(topic) {
-            Some(channel) => {
-                channel.sequence = channel.sequence.wrapping_add(1);
-                channel.id
-            }
-            None => self.open(topic, schema)?,
-        };
-        let sequence = self.channels.get(topic).map_or(0, |channel| channel.sequence);
-        let header = MessageHeader { channel_id, sequence, log_time: at_ns, publish_time: at_ns };
-        self.writer.write_to_known_channel(&header, data).map_err(|source| self.failed(source))
     }
 
     fn open(&mut self, topic: &str, schema: Option<SchemaName>) -> Result<u16, RecordError> {
@@ -186,5 +179,26 @@ impl Recorder {
 
     fn failed(&self, source: McapError) -> RecordError {
         RecordError::Write { path: self.path.clone(), source }
+    }
+}
+
+impl Log for Recorder {
+    fn write(
+        &mut self,
+        topic: &str,
+        schema: Option<SchemaName>,
+        at_ns: u64,
+        data: Vec<u8>,
+    ) -> Result<(), RecordError> {
+        let channel_id = match self.channels.get_mut(topic) {
+            Some(channel) => {
+                channel.sequence = channel.sequence.wrapping_add(1);
+                channel.id
+            }
+            None => self.open(topic, schema)?,
+        };
+        let sequence = self.channels.get(topic).map_or(0, |channel| channel.sequence);
+        let header = MessageHeader { channel_id, sequence, log_time: at_ns, publish_time: at_ns };
+        self.writer.write_to_known_channel(&header, &data).map_err(|source| self.failed(source))
     }
 }

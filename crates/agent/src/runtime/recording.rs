@@ -6,8 +6,8 @@ use super::{RuntimeError, queue::Queue};
 use crate::AgentConfig;
 use crate::io::{Input, Output};
 use crate::record::{
-    EventMessage, InboxError, RecordError, Recorder, SchemaName, StepRecord, record_config, record_outputs,
-    record_step,
+    EventMessage, InboxError, Log, RecordError, Recorder, SchemaName, StepRecord, record_config,
+    record_outputs, record_step,
 };
 use fleet_core::types::Nanos;
 use fleet_core::wire::{Event, EventKind};
