@@ -208,7 +208,9 @@ def spread(least: Array, windows: Array, horizon: float, sample: float) -> Array
     while done <= n:
         best, end = np.inf, n
         for k in range(done, n + 1):
-            ratio = (late[k] - clock) / max(least[done : k + 1].sum(), 1e-6)
+            room, need = late[k] - clock, least[done : k + 1].sum()
+            # Legs that take no time need no room: any ratio will do, as long as the window is not over.
+            ratio = room / need if need > 1e-6 else (1.0 if -1e-9 <= room <= 1e-6 else room / 1e-6)
             if ratio <= best + 1e-12:
                 best, end = ratio, k
         if best < 1 - 1e-9:

@@ -9,7 +9,7 @@ import pytest
 from tests.integration.conftest import SCENARIOS, environment
 
 #: Slow to import, or large.
-HEAVY = {"casadi", "matplotlib", "mcap", "ompl", "ortools", "pandas", "PIL", "plotly", "rtamt", "zenoh"}
+HEAVY = {"casadi", "matplotlib", "mcap", "ortools", "pandas", "PIL", "plotly", "rtamt", "zenoh"}
 #: Needed to plan, not to explain.
 PLANNING = {"clarabel", "lark", "numpy", "scipy"}
 POWER_TOWER = str(SCENARIOS / "power_tower.toml")

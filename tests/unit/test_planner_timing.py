@@ -190,7 +190,8 @@ heading = 0.0
 def test_tight_unequal_windows_need_times_as_unknowns(tmp_path: Path) -> None:
     """60 m and two stops in 23 s at 3 m/s: only the legs that begin or end at rest need the slack.
 
-    Spread evenly, all early or all late, the visits are no visits, or within the tube of not being any.
+    At times that legs alone tell (even, early or late, from centres or from edges) the visits come nowhere
+    near the margin that their times leave room for.
     """
     windows = ((6.0, "0,5"), (12.0, "0,6"), (18.0, "6,8"), (30.0, "9,12"))
     scenario = alone(
@@ -198,8 +199,7 @@ def test_tight_unequal_windows_need_times_as_unknowns(tmp_path: Path) -> None:
     )
     task = problem(scenario)
     fixed = [convex.optimise(setup(task, way, 1.0))[1].r for way in schedules(task, 1.0)]
-    assert len(fixed) == 3
-    assert max(fixed) < task.tube
+    assert max(fixed) < 0.7
     found = plan(scenario)
     assert found.rho >= 0.95 * found.rho_bound
     assert found.rho_lower > 0.9

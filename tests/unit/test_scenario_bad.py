@@ -101,7 +101,7 @@ CASES = [
     ([("replan", "T_e"), 0.025], "replan.T_e", "multiple of mission.T_s"),
     ([("replan", "T_g"), 0.1], "replan.T_g", "longer than T_e"),
     ([("replan", "enabled"), "yes"], "replan.enabled", "'yes'"),
-    ([("planner", "segment"), 0.1], "planner.segment", "at least"),
+    ([("planner", "segment"), 0.1], "mission.T", "at most 25.6 s"),
     ([("wind", "velocity"), [1.0, 2.0]], "wind.velocity[2]", "missing"),
     ([("obstacle",), {"name": "x"}], "obstacle", "[[obstacle]]"),
     ([("obstacle", 0, "name"), "tr1"], "target[0].name", "obstacle[0]"),

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from fleet.errors import Conflict, InfeasibleError, Need
@@ -26,6 +27,9 @@ from .trial import Trials
 
 if TYPE_CHECKING:
     from fleet.scenario import Scenario
+
+#: Clauses that are looked at one by one before a conflict of several is told.
+FEW = 24
 
 
 @dataclass
@@ -57,13 +61,20 @@ class Court:
         found = next(self.impossible(self.task), None)
         if found is None:
             return None
-        least = irreducible(found.clauses, self.hopeless)
+        least = self.hopeless_alone or irreducible(found.clauses, self.hopeless)
         part = subset(self.task, least)
         again = next(self.impossible(part), found)
         # The clauses that are left may be forbidden by another proof than all of them were.
         times = tuple(reached(part, least))
         minimal = self.freed(least)
         return refusal(self.task, Conflict(least, True, minimal, again.why, times))
+
+    @property
+    def hopeless_alone(self) -> tuple[str, ...]:
+        """A clause that no plan can keep whatever the others say, if there is one: the smallest conflict."""
+        clauses = tuple(self.task.spec.kinds)
+        alone = (c for c in clauses if len(clauses) <= FEW and self.hopeless((c,)))
+        return tuple(islice(alone, 1))
 
     def hopeless(self, clauses: tuple[str, ...]) -> bool:
         """Whether these clauses are proved to be impossible together."""
@@ -79,7 +90,8 @@ class Court:
         """Clauses that are false by regions, reach and the mission's own invariants alone."""
         judge = Judge(self.scenario, task.spec.invariants)
         for clause in self.scenario.clauses():
-            if task.spec.kinds.get(clause.id) == "rest":
+            # The windows of visits are those of the problem, not of the text: a deadline may have given way.
+            if task.spec.kinds.get(clause.id) in ("rest", "invariant"):
                 found = judge.over(negation_normal(clause.formula), 0.0, 0.0)
                 if found is not None and not found.true:
                     supporting = [i.clause for i in task.spec.invariants]

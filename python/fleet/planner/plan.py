@@ -18,7 +18,7 @@ from .improve import Attempt, Certified, Lead, improvements
 from .problem import Problem, problem
 from .progress import Progress, TimeUp, silent
 from .relax import relaxed
-from .result import PlanResult, result
+from .result import AT_BOUND, PlanResult, result
 from .schedule import Itinerary, schedules
 from .sketch import sketched
 from .watch import Watch
@@ -215,7 +215,7 @@ def attempt(
     the plan is too large for the wire.
     """
     tell("build", bound)
-    flight = groups.fly(one.task, one.way, wanted(one.task), one.run, tell, one.timing)
+    flight = flown(one, tell)
     one = replace(one, way=flight.way)
     lead.tried.append((one, flight.margins))
     watch.lap("solve")
@@ -235,6 +235,16 @@ def attempt(
     watch.lap("certify")
     refuse_broken(out, one.task.excused)
     return Certified(replace(out, timings=dict(watch.spent)), one, flight.tracks)
+
+
+def flown(one: Attempt, tell: Progress) -> groups.Flight:
+    """The trajectories of an attempt: by weights only where not all clauses can have the best margin."""
+    plain = replace(one.task, weights={})
+    if one.task.weights != plain.weights:
+        flight = groups.fly(plain, one.way, wanted(plain), one.run, tell, one.timing)
+        if flight.margins.share <= 1 and flight.margins.r >= wanted(plain) - AT_BOUND:
+            return flight
+    return groups.fly(one.task, one.way, wanted(one.task), one.run, tell, one.timing)
 
 
 def refuse(task: Problem, margins: convex.Margins) -> None:

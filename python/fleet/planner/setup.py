@@ -105,7 +105,9 @@ def route_positions(setup: Setup, drone: int) -> Array:
     out = np.empty((len(times), 3))
     for k, path in enumerate(setup.itinerary.paths[drone]):
         mine = leg == k
-        u = np.clip((times[mine] - leave[k]) / (reach[k] - leave[k]), 0.0, 1.0)
+        # A visit may be where the drone is already: a leg that takes no time is flown.
+        time = reach[k] - leave[k]
+        u = np.clip((times[mine] - leave[k]) / time, 0.0, 1.0) if time > 0 else np.ones(mine.sum())
         out[mine] = follow(path, u**3 * (10 - 15 * u + 6 * u**2))
     return out
 

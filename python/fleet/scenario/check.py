@@ -51,8 +51,11 @@ def _mission(mission: Mission, planner: Planner | None, problems: Problems) -> N
     # Half of the wire's segments are left for the times of events.
     least = 2 * mission.T / MAX_SEGMENTS
     if planner is not None and planner.segment < least:
-        message = f"{planner.segment:g} s is not legal; must be at least {least:g} s for T = {mission.T:g} s"
-        problems.add("value", "planner.segment", message)
+        message = (
+            f"{mission.T:g} s is not legal with planner.segment = {planner.segment:g} s; must be at most "
+            f"{planner.segment * MAX_SEGMENTS / 2:g} s, or segments at least {least:g} s long (at most 10 s)"
+        )
+        problems.add("value", "mission.T", message)
 
 
 def _replan(replan: Replan, mission: Mission, problems: Problems) -> None:

@@ -39,7 +39,7 @@ class Document(Table):
     replan: Replan = Field(default_factory=Replan)
     planner: Planner = Field(default_factory=lambda: Planner.model_validate({}))
     energy: Energy | None = None
-    wind: Wind = Field(default_factory=Wind)
+    wind: Wind = Field(default_factory=lambda: Wind.model_validate({}))
     obstacle: list[Obstacle] = Field(default_factory=list)
     target: list[TargetTable] = Field(default_factory=list)
     region: list[NamedRegion] = Field(default_factory=list)

@@ -30,7 +30,7 @@ class Table(BaseModel):
 class Mission(Table):
     """`[mission]`: duration T and sample period T_s [s], smoothing c (paper, Def. 2), formula text."""
 
-    T: float = Field(gt=0, le=3600)
+    T: float = Field(gt=0, le=2560)
     T_s: float = Field(0.05, ge=0.01, le=1)
     c: float = Field(5.0, gt=0, le=1000)
     formula: str | None = None
